@@ -1,0 +1,1 @@
+"""The pose graph: the only package that knows gtsam."""

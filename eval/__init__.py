@@ -1,0 +1,1 @@
+"""Evaluation: trajectories, loop truth, plots and reports."""

@@ -1,0 +1,1 @@
+"""Odometry: where the camera moved from frame to frame, and which frames become keyframes."""

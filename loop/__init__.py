@@ -1,0 +1,1 @@
+"""Loop closures: detectors that propose them and the verification that decides."""

@@ -1,0 +1,1 @@
+"""Semantic segmentation: the network, its training and its use."""

@@ -1,0 +1,25 @@
+"""The role of a segmenter."""
+
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+import numpy.typing as npt
+
+from semslam.types import LabelMap
+
+
+@runtime_checkable
+class Segmenter(Protocol):
+    """Gives each pixel of an image a class."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Class names; index 0 is "void"."""
+
+    def segment(self, color: npt.NDArray[np.uint8], frame_index: int | None = None) -> LabelMap:
+        """Label an RGB image (H, W, 3) uint8; labels come back at its full size.
+
+        Args:
+            color: the image.
+            frame_index: its place in the sequence, for segmenters that look labels up.
+        """

@@ -1,0 +1,48 @@
+"""The role of a dataset."""
+
+from collections.abc import Iterator
+from typing import Protocol, runtime_checkable
+
+from semslam.types import Frame, Intrinsics, Trajectory
+
+
+@runtime_checkable
+class Dataset(Protocol):
+    """A recorded or rendered RGB-D sequence.
+
+    Frames come in ascending time; frame ``index`` counts from 0 within the dataset and ``frame(i).index == i``.
+    Reading is lazy: only one frame is in memory at a time.
+    """
+
+    @property
+    def name(self) -> str:
+        """Short name for folders and titles."""
+
+    @property
+    def intrinsics(self) -> Intrinsics:
+        """The camera of all frames."""
+
+    @property
+    def timestamps(self) -> list[float]:
+        """Seconds, strictly ascending, one per frame."""
+
+    @property
+    def ground_truth(self) -> Trajectory | None:
+        """Camera poses T_world_cam at the truth's own stamps, or None."""
+
+    @property
+    def notes(self) -> list[str]:
+        """What was mended or left out while the lists were read, a sentence each."""
+
+    def __len__(self) -> int:
+        """Number of frames."""
+
+    def frame(self, index: int) -> Frame:
+        """Read one frame.
+
+        Raises:
+            DatasetError: an image is missing, truncated or of the wrong size; the message names the file.
+        """
+
+    def __iter__(self) -> Iterator[Frame]:
+        """Frames in order."""
