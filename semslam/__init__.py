@@ -23,7 +23,6 @@ _HOMES = {
     "open_dataset": "semslam.datasets",
     "run": "semslam.pipeline",
 }
-__all__ = ["__version__", *sorted(_HOMES)]
 
 
 def __getattr__(name: str) -> Any:
@@ -33,4 +32,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return __all__
+    return ["__version__", *sorted(_HOMES)]

@@ -46,9 +46,7 @@ class SegmentationConfig(Section):
     height: int = Field(240, gt=0, description="input height in pixels")
     threads: int = Field(1, gt=0, description="inference threads")
     labels_dir: Path | None = Field(None, description="folder of label images for the segmenter 'folder'")
-    cache_dir: Path | None = Field(
-        None, description="where segmentations are cached by content; none = no cache"
-    )
+    cache_dir: Path | None = Field(None, description="where segmentations are cached by content; none = no cache")
 
 
 class LoopConfig(Section):
@@ -82,9 +80,7 @@ class Config(Section):
     loops: LoopConfig = LoopConfig()
     verification: VerificationConfig = VerificationConfig()
     backend: BackendConfig = BackendConfig()
-    plugins: dict[str, dict[str, Any]] = Field(
-        {}, description="settings of outside plug-ins, by plug-in name"
-    )
+    plugins: dict[str, dict[str, Any]] = Field({}, description="settings of outside plug-ins, by plug-in name")
 
     def with_changes(self, **changes: Any) -> Self:
         """A copy with top-level fields or whole sections replaced, checked again.
@@ -115,9 +111,7 @@ def load_config(path: Path | None = None, overrides: Mapping[str, Any] | None = 
         except (OSError, UnicodeDecodeError) as error:
             raise ConfigError(f"The settings file {path} cannot be read: {error}.") from error
         except yaml.YAMLError as error:
-            raise ConfigError(
-                f"The settings file {path} is not YAML: {' '.join(str(error).split())}."
-            ) from error
+            raise ConfigError(f"The settings file {path} is not YAML: {' '.join(str(error).split())}.") from error
         if not isinstance(values, dict):
             raise ConfigError(f"The settings file {path} must hold 'key: value' pairs.")
     return _validated(Config, _merged(values, overrides or {}))
@@ -148,13 +142,10 @@ def parse_overrides(settings: list[str]) -> dict[str, Any]:
 
 def _merged(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
     merged = dict(base)
-    for key, value in changes.items():
-        if isinstance(value, Section):
-            value = value.model_dump()
+    for key, change in changes.items():
+        value = change.model_dump() if isinstance(change, Section) else change
         inside = merged.get(key)
-        merged[key] = (
-            _merged(inside, value) if isinstance(inside, dict) and isinstance(value, Mapping) else value
-        )
+        merged[key] = _merged(inside, value) if isinstance(inside, dict) and isinstance(value, Mapping) else value
     return merged
 
 

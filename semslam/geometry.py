@@ -44,18 +44,14 @@ def transform_points(T_a_b: FloatArray, points_b: npt.NDArray[np.floating]) -> F
 def rotation_angle(T: FloatArray) -> FloatArray:
     """Angle in radians of the rotation part of transforms (..., 4, 4); exact for small angles too."""
     R = T[..., :3, :3]
-    axis = np.stack(
-        [R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]], -1
-    )
+    axis = np.stack([R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]], -1)
     cosine = np.trace(R, axis1=-2, axis2=-1) - 1.0
     return np.asarray(np.arctan2(np.linalg.norm(axis, axis=-1), cosine))
 
 
 def exp_so3(rotation_vector: npt.ArrayLike) -> FloatArray:
     """Rotation (3, 3) of a rotation vector (3,) in radians."""
-    return np.asarray(
-        cv2.Rodrigues(np.asarray(rotation_vector, dtype=np.float64).reshape(3, 1))[0], dtype=np.float64
-    )
+    return np.asarray(cv2.Rodrigues(np.asarray(rotation_vector, dtype=np.float64).reshape(3, 1))[0], dtype=np.float64)
 
 
 def log_so3(R: FloatArray) -> FloatArray:
@@ -81,9 +77,7 @@ def is_rigid(T: FloatArray, tolerance: float = ORTHONORMAL_TOLERANCE) -> bool:
     gram = R @ np.swapaxes(R, -1, -2)
     last_row = np.abs(T[..., 3, :] - np.array([0.0, 0.0, 0.0, 1.0])).max(initial=0.0)
     return bool(
-        np.abs(gram - np.eye(3)).max(initial=0.0) < tolerance
-        and (np.linalg.det(R) > 0).all()
-        and last_row < 1e-9
+        np.abs(gram - np.eye(3)).max(initial=0.0) < tolerance and (np.linalg.det(R) > 0).all() and last_row < 1e-9
     )
 
 

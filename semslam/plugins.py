@@ -65,12 +65,8 @@ def load(group: str, name: str) -> Any:
                 return entry.load()
             except Exception as error:  # a plug-in may fail in any way it likes
                 warnings.warn(f"The plug-in {entry.value} is broken: {error!r}", stacklevel=2)
-                raise ConfigError(
-                    f"The plug-in '{name}' ({entry.value}) does not import: {error}."
-                ) from error
+                raise ConfigError(f"The plug-in '{name}' ({entry.value}) does not import: {error}.") from error
     known = names(group)
     close = difflib.get_close_matches(name, known, n=1)
     hint = f" Did you mean '{close[0]}'?" if close else ""
-    raise ConfigError(
-        f"There is no {group.split('.')[1].rstrip('s')} '{name}'.{hint} Known: {', '.join(known)}."
-    )
+    raise ConfigError(f"There is no {group.split('.')[1].rstrip('s')} '{name}'.{hint} Known: {', '.join(known)}.")
