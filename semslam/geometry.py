@@ -125,3 +125,18 @@ def compose(motions: Iterable[FloatArray], start: FloatArray) -> FloatArray:
     for motion in motions:
         poses.append(orthonormalise(poses[-1] @ motion))
     return np.stack(poses)
+
+
+def adjoint(T: FloatArray) -> FloatArray:
+    """Adjoint (6, 6) of a transform T_a_b: takes tangent vectors (rotation first) of b to a."""
+    x, y, z = T[:3, 3]
+    out = np.zeros((6, 6))
+    out[:3, :3] = out[3:, 3:] = T[:3, :3]
+    out[3:, :3] = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]) @ T[:3, :3]
+    return out
+
+
+def interpolate(T_w_a: FloatArray, T_w_b: FloatArray, share: float) -> FloatArray:
+    """The transform ``share`` (0..1) of the way from a to b: rotation along the shortest arc, translation straight."""
+    rotation = exp_so3(share * log_so3(T_w_a[:3, :3].T @ T_w_b[:3, :3]))
+    return make_transform(T_w_a[:3, :3] @ rotation, (1.0 - share) * T_w_a[:3, 3] + share * T_w_b[:3, 3])

@@ -1,1 +1,250 @@
-"""Placeholder of slam."""
+"""The algorithm: a frame in, a state out. It reads no files, writes none and prints nothing."""
+
+from dataclasses import dataclass, field
+from typing import Self
+
+import numpy as np
+
+from backend.pose_graph import GraphSolution, PoseGraph
+from frontend.keyframes import KeyframePolicy, make_keyframe
+from frontend.odometry import Odometry
+from loop.detector import LoopDetector
+from loop.segmentation.segmenter import Segmenter
+from loop.verification import IcpVerifier, LoopVerifier
+from semslam import plugins
+from semslam.config import Config
+from semslam.features import FeatureExtractor
+from semslam.geometry import adjoint, invert, orthonormalise
+from semslam.recovery import recover_poses
+from semslam.stopwatch import Stopwatch
+from semslam.types import (
+    FloatArray,
+    Frame,
+    Keyframe,
+    KeyframeView,
+    LoopCandidate,
+    LoopConstraint,
+    LoopRejection,
+    Motion,
+    Observations,
+    TrackingStatus,
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FrameState:
+    """What is known of a frame once it has been processed.
+
+    Attributes:
+        index: its place in the sequence.
+        timestamp: seconds.
+        status: how far its pose can be trusted.
+        map_id: the odometry's map it belongs to.
+        T_odom_cam: (4, 4) causal odometry pose.
+        keyframe: id of the keyframe made of it, if any.
+    """
+
+    index: int
+    timestamp: float
+    status: TrackingStatus
+    map_id: int
+    T_odom_cam: FloatArray
+    keyframe: int | None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SlamResult:
+    """What a finished run knows.
+
+    Attributes:
+        frames: the state of every frame, in order.
+        keyframes: in order of their ids.
+        candidates: what the detector proposed, in order.
+        outcomes: what the verification made of each candidate.
+        solution: optimised keyframe poses and a verdict for each verified loop.
+        poses: (N, 4, 4) optimised T_world_cam of every frame.
+        components: for each frame the map it ends in; maps that a loop joined share a number.
+    """
+
+    frames: tuple[FrameState, ...]
+    keyframes: tuple[Keyframe, ...]
+    outcomes: tuple[LoopConstraint | LoopRejection, ...]
+    solution: GraphSolution
+    poses: FloatArray
+    components: tuple[int, ...]
+
+    @property
+    def candidates(self) -> tuple[LoopCandidate, ...]:
+        """What the detector proposed, in the order of ``outcomes``."""
+        return tuple(outcome.candidate for outcome in self.outcomes)
+
+
+@dataclass(slots=True)
+class _SinceKeyframe:
+    """Uncertainty of the motion since the last keyframe, in the current camera's tangent space."""
+
+    covariance: FloatArray = field(default_factory=lambda: np.zeros((6, 6)))
+
+    def extend(self, motion: Motion) -> None:
+        carry = adjoint(invert(motion.T_prev_cur))
+        self.covariance = carry @ self.covariance @ carry.T + motion.covariance
+
+
+class Slam:
+    """RGB-D SLAM: odometry, keyframes, loop detection, verification, pose graph.
+
+    Args:
+        odometry: tracks frames.
+        segmenter: labels keyframes for detectors that ask for it.
+        detector: proposes loops.
+        verifier: decides on them.
+        graph: joins motions and loops.
+        config: settings of keyframes and features.
+        stopwatch: collects stage times.
+    """
+
+    def __init__(
+        self,
+        odometry: Odometry,
+        segmenter: Segmenter | None,
+        detector: LoopDetector,
+        verifier: LoopVerifier,
+        graph: PoseGraph,
+        config: Config,
+        stopwatch: Stopwatch,
+    ) -> None:
+        self._odometry = odometry
+        self._segmenter = segmenter
+        self._detector = detector
+        self._verifier = verifier
+        self._graph = graph
+        self._config = config
+        self._stopwatch = stopwatch
+        self._extractor = FeatureExtractor(config.features)
+        self._policy = KeyframePolicy(config.keyframes)
+        self._T_odom_cam: FloatArray = np.eye(4)
+        self._since_keyframe = _SinceKeyframe()
+        self._frames: list[FrameState] = []
+        self._keyframes: list[Keyframe] = []
+        self._outcomes: list[LoopConstraint | LoopRejection] = []
+        self._observations: dict[int, Observations] = {}
+
+    @classmethod
+    def from_config(cls, config: Config, stopwatch: Stopwatch | None = None) -> Self:
+        """Build every part by its registered name.
+
+        Raises:
+            ConfigError: a name is unknown.
+            ModelError: the network's weights are missing or damaged.
+        """
+        detector = plugins.load("semslam.detectors", config.detector).from_config(config)
+        segmenter = None
+        if detector.needs_labels:
+            segmenter = plugins.load("semslam.segmenters", config.segmentation.name).from_config(config)
+        return cls(
+            odometry=plugins.load("semslam.odometry", config.odometry).from_config(config),
+            segmenter=segmenter,
+            detector=detector,
+            verifier=IcpVerifier.from_config(config),
+            graph=PoseGraph(config.backend),
+            config=config,
+            stopwatch=stopwatch or Stopwatch(),
+        )
+
+    def process(self, frame: Frame) -> FrameState:
+        """Track a frame and, where it is due, make it a keyframe and look for loops.
+
+        Raises:
+            DatasetError: the frame does not fit its intrinsics.
+        """
+        with self._stopwatch.stage("odometry"):
+            motion = self._odometry.track(frame)
+        self._T_odom_cam = orthonormalise(self._T_odom_cam @ motion.T_prev_cur)
+        self._since_keyframe.extend(motion)
+        keyframe = None
+        if motion.status is not TrackingStatus.LOST and self._policy.is_due(
+            frame.timestamp, self._T_odom_cam, motion.map_id
+        ):
+            keyframe = self._add_keyframe(frame, motion)
+        state = FrameState(
+            index=frame.index,
+            timestamp=frame.timestamp,
+            status=motion.status,
+            map_id=motion.map_id,
+            T_odom_cam=self._T_odom_cam,
+            keyframe=None if keyframe is None else keyframe.id,
+        )
+        self._frames.append(state)
+        return state
+
+    def finish(self) -> SlamResult:
+        """Optimise the graph and recover every frame's pose; may be called at any time, also more than once."""
+        with self._stopwatch.stage("optimize"):
+            solution = self._graph.optimize()
+        components = self._components(solution)
+        return SlamResult(
+            frames=tuple(self._frames),
+            keyframes=tuple(self._keyframes),
+            outcomes=tuple(self._outcomes),
+            solution=solution,
+            poses=recover_poses(
+                np.array([state.timestamp for state in self._frames]),
+                np.array([state.T_odom_cam for state in self._frames]).reshape(-1, 4, 4),
+                np.array([state.map_id for state in self._frames], dtype=np.int64),
+                self._keyframes,
+                solution.poses,
+            ),
+            components=tuple(components[state.map_id] for state in self._frames),
+        )
+
+    def _add_keyframe(self, frame: Frame, motion: Motion) -> Keyframe:
+        with self._stopwatch.stage("keyframe"):
+            keyframe = make_keyframe(
+                len(self._keyframes),
+                frame,
+                self._T_odom_cam,
+                motion.map_id,
+                self._extractor.extract(frame),
+                self._config.keyframes,
+            )
+        self._policy.note(frame.timestamp, self._T_odom_cam, motion.map_id)
+        self._connect(keyframe)
+        self._keyframes.append(keyframe)
+        if motion.observations is not None:
+            self._observations[keyframe.id] = motion.observations
+        self._close_loops(frame, keyframe)
+        return keyframe
+
+    def _connect(self, keyframe: Keyframe) -> None:
+        self._graph.add_keyframe(keyframe.id, keyframe.T_odom_cam)
+        if self._keyframes and self._keyframes[-1].map_id == keyframe.map_id:
+            previous = self._keyframes[-1]
+            T_previous_this = invert(previous.T_odom_cam) @ keyframe.T_odom_cam
+            self._graph.add_odometry(previous.id, keyframe.id, T_previous_this, self._since_keyframe.covariance)
+        self._since_keyframe = _SinceKeyframe()
+
+    def _close_loops(self, frame: Frame, keyframe: Keyframe) -> None:
+        labels = None
+        if self._segmenter is not None:
+            with self._stopwatch.stage("segmentation"):
+                labels = self._segmenter.segment(frame.color, frame.index)
+        view = KeyframeView(keyframe, frame.color, frame.depth, labels)
+        with self._stopwatch.stage("query"):
+            candidates = self._detector.query(view)
+            self._detector.add(view)
+        for candidate in candidates:
+            with self._stopwatch.stage("verify"):
+                outcome = self._verifier.verify(keyframe, self._keyframes[candidate.match], candidate)
+            self._outcomes.append(outcome)
+            if isinstance(outcome, LoopConstraint):
+                self._graph.add_loop(outcome)
+
+    def _components(self, solution: GraphSolution) -> dict[int, int]:
+        """Which maps belong together once accepted loops join them: map id -> smallest map id of its group."""
+        group = {state.map_id: state.map_id for state in self._frames}
+        for verdict in solution.verdicts:
+            if verdict.accepted:
+                candidate = verdict.constraint.candidate
+                a, b = (group[self._keyframes[k].map_id] for k in (candidate.query, candidate.match))
+                group = {map_id: min(a, b) if g in (a, b) else g for map_id, g in group.items()}
+        return group
