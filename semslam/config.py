@@ -1,8 +1,9 @@
 """Settings: one small frozen model per stage, joined in ``Config``; read from YAML, overridden, dumped."""
 
 from collections.abc import Mapping
+from enum import StrEnum
 from pathlib import Path
-from typing import Any, Self, TypeVar
+from typing import Any, Literal, Self, TypeVar
 
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -10,10 +11,44 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from semslam.errors import ConfigError
 
 
+Interval = tuple[float, float]
+
+
 class Section(BaseModel):
     """Base of all sections: frozen, and an unknown key is an error."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class FaultConfig(Section):
+    """Faults put into a sequence on purpose; intervals are (from, to) in seconds since its first frame."""
+
+    drop: float = Field(0.0, ge=0, lt=1, description="share of frames left out at random")
+    unreadable: float = Field(0.0, ge=0, lt=1, description="share of frames whose image cannot be read, at random")
+    gaps: tuple[Interval, ...] = Field((), description="intervals without any frame")
+    black: tuple[Interval, ...] = Field((), description="intervals of black colour images")
+    no_depth: tuple[Interval, ...] = Field((), description="intervals without a single depth value")
+    nan_depth: tuple[Interval, ...] = Field((), description="intervals in which half of the depth values are NaN")
+    blur: tuple[Interval, ...] = Field((), description="intervals of strong motion blur")
+    frozen: tuple[Interval, ...] = Field((), description="intervals in which the image before them is repeated")
+    seed: int = Field(0, ge=0, description="seed of what is drawn at random")
+
+
+class DatasetConfig(Section):
+    """Which frames are read, and how. What is set here wins over camera.yaml, which wins over the folder's name."""
+
+    loader: str | None = Field(None, description="registered loader; none = guessed from the path")
+    camera: Path | None = Field(None, description="camera.yaml used in place of the sequence's own")
+    depth_scale: float | None = Field(None, gt=0, description="units of the depth images per metre")
+    association_window: float = Field(0.02, gt=0, description="seconds between a colour image and its depth image")
+    fps: float = Field(30.0, gt=0, description="frames per second, where the sequence has no time stamps")
+    register_depth: bool = Field(True, description="7-Scenes: warp raw depth into the colour camera")
+    color_topic: str | None = Field(None, description="ROS bag: topic of the colour images; none = guessed")
+    depth_topic: str | None = Field(None, description="ROS bag: topic of the depth images; none = guessed")
+    start: int = Field(0, ge=0, description="frames left out at the beginning")
+    max_frames: int | None = Field(None, gt=0, description="frames read at the most")
+    stride: int = Field(1, gt=0, description="every n-th frame is read")
+    faults: FaultConfig = FaultConfig()
 
 
 class FeatureConfig(Section):
@@ -23,6 +58,8 @@ class FeatureConfig(Section):
     levels: int = Field(8, gt=0, description="pyramid levels")
     scale: float = Field(1.2, gt=1, description="scale between levels")
     fast_threshold: int = Field(12, gt=0, description="FAST corner threshold")
+    cell: int = Field(32, gt=0, description="pixels; side of the cells over which keypoints are spread")
+    per_cell: int = Field(6, gt=0, description="keypoints a cell keeps")
     min_depth: float = Field(0.2, ge=0, description="metres; nearer depth is not used")
     max_depth: float = Field(6.0, gt=0, description="metres; farther depth is not used")
 
@@ -49,11 +86,109 @@ class SegmentationConfig(Section):
     cache_dir: Path | None = Field(None, description="where segmentations are cached by content; none = no cache")
 
 
+class TrainingConfig(Section):
+    """How the segmentation network is trained; the size of its input is the segmenter's."""
+
+    start: Path | None = Field(None, description="weights to start from: ADE20K state dict or own checkpoint")
+    epochs: int = Field(60, gt=0, description="passes over the labelled photos")
+    batch: int = Field(8, gt=1, description="views in one step")
+    rate: float = Field(1e-3, gt=0, description="peak learning rate of decoder and head")
+    encoder_rate: float = Field(0.25, ge=0, description="learning rate of the encoder as a share of the peak")
+    weight_decay: float = Field(0.02, ge=0, description="decoupled weight decay")
+    warmup: float = Field(0.08, ge=0, lt=1, description="share of the steps in which the rate climbs")
+    average: float = Field(0.998, ge=0, lt=1, description="decay of the weight average that is kept")
+    pseudo: tuple[Path, ...] = Field((), description="more folders of photos whose labels a teacher made")
+    pseudo_share: float = Field(0.4, ge=0, lt=1, description="share of views drawn from those")
+    threads: int = Field(1, gt=0, description="training threads")
+    save_every: float = Field(60.0, gt=0, description="seconds between checkpoints")
+
+
 class LoopConfig(Section):
     """What holds for every detector."""
 
     min_gap: float = Field(5.0, ge=0, description="seconds that must lie between the frames of a loop")
     max_candidates: int = Field(5, gt=0, description="candidates a query may hand to the verification")
+    min_score: float | None = Field(None, ge=0, le=1, description="score of a candidate; none = the detector's own")
+
+
+class ShareReading(StrEnum):
+    """What a count of common things is divided by; the paper's formulas (1) and (3) leave it open."""
+
+    DICE = "dice"
+    LARGER = "larger"
+    UNION = "union"
+    QUERY = "query"
+
+
+class DepthReading(StrEnum):
+    """Which depth a mask block's node gets: that of the centroid's pixel (the paper), or the block's median."""
+
+    CENTROID = "centroid"
+    MEDIAN = "median"
+
+
+class DepthUnit(StrEnum):
+    """The unit of depth beside u and v in pixels; raw is the TUM format's 5000 a metre."""
+
+    METRE = "m"
+    CENTIMETRE = "cm"
+    MILLIMETRE = "mm"
+    RAW = "raw"
+
+    @property
+    def per_metre(self) -> float:
+        """How many of the unit make a metre."""
+        return {"m": 1.0, "cm": 100.0, "mm": 1000.0, "raw": 5000.0}[self.value]
+
+
+class DistanceReading(StrEnum):
+    """Between what the Euclidean distance of two nodes is taken: (u, v), or (u, v, depth)."""
+
+    IMAGE = "image"
+    IMAGE_DEPTH = "image_depth"
+
+
+class MatchReading(StrEnum):
+    """Which similar nodes are counted: each node once (mutually nearest), or every node that has a partner."""
+
+    ONE_TO_ONE = "one_to_one"
+    ANY_PARTNER = "any_partner"
+
+
+class NodeConfig(Section):
+    """Semantic nodes (paper, section 3.1). Lengths in pixels are for a larger image side of 640 and scale with it."""
+
+    connectivity: Literal[4, 8] = Field(8, description="neighbours that join pixels of a label to a block")
+    min_area: float = Field(0.0, ge=0, lt=1, description="share of the image below which a block is left out")
+    depth: DepthReading = Field(DepthReading.CENTROID, description="which depth a block gets")
+    keep_without_depth: bool = Field(True, description="keep nodes without depth, at depth 0")
+    cluster_radius: float = Field(40.0, ge=0, description="pixels; DBSCAN's eps among nodes of a label; 0 = off")
+    cluster_size: int = Field(3, ge=2, description="DBSCAN's least number of nodes ('greater than 2')")
+
+
+class SemanticConfig(Section):
+    """The paper's detector (section 3.2) with thresholds that forgive a moved camera; the verification decides."""
+
+    nodes: NodeConfig = NodeConfig(min_area=0.01)
+    min_label_share: float = Field(0.0, ge=0, le=1, description="share of common labels, formula (1); 0 = no gate")
+    label_share: ShareReading = Field(ShareReading.DICE, description="what the count of common labels is divided by")
+    min_cosine: float = Field(-1.0, ge=-1, le=1, description="cosine of (u, v, depth), formula (2); -1 = no test")
+    cosine_depth: DepthUnit = Field(DepthUnit.MILLIMETRE, description="unit of depth in the cosine")
+    max_distance: float = Field(0.1, gt=0, description="node distance as a share of the larger image side")
+    distance: DistanceReading = Field(DistanceReading.IMAGE, description="what the node distance is taken between")
+    matching: MatchReading = Field(MatchReading.ONE_TO_ONE, description="which similar nodes are counted")
+    min_node_share: float = Field(0.5, ge=0, le=1, description="share of similar nodes that makes a candidate")
+    node_share: ShareReading = Field(ShareReading.DICE, description="what the count of similar nodes is divided by")
+
+
+class PaperSemanticConfig(SemanticConfig):
+    """The paper's detector with the paper's thresholds (section 4.3)."""
+
+    nodes: NodeConfig = NodeConfig()
+    min_label_share: float = Field(0.8, ge=0, le=1, description="share of common labels, formula (1)")
+    min_cosine: float = Field(0.999, ge=-1, le=1, description="cosine of (u, v, depth), formula (2)")
+    max_distance: float = Field(0.025, gt=0, description="node distance as a share of the larger image side")
+    min_node_share: float = Field(0.75, ge=0, le=1, description="share of similar nodes, formula (3)")
 
 
 class VerificationConfig(Section):
@@ -66,6 +201,10 @@ class BackendConfig(Section):
     """The pose graph's optimisation."""
 
     robust: str = Field("gnc", description="how false loops are held off: gnc, dcs, cauchy, huber or none")
+    max_residual: float = Field(
+        4.1, gt=0, description="Mahalanobis distance at which a loop is taken for false; 4.1 = 99 % of true ones"
+    )
+    max_iterations: int = Field(100, gt=0, description="Levenberg-Marquardt steps at the most")
 
 
 class Config(Section):
@@ -74,10 +213,14 @@ class Config(Section):
     seed: int = Field(0, ge=0, description="seed of everything that draws random numbers")
     odometry: str = Field("feature", description="registered odometry")
     detector: str = Field("semantic", description="registered loop detector")
+    dataset: DatasetConfig = DatasetConfig()
     features: FeatureConfig = FeatureConfig()
     keyframes: KeyframeConfig = KeyframeConfig()
     segmentation: SegmentationConfig = SegmentationConfig()
+    training: TrainingConfig = TrainingConfig()
     loops: LoopConfig = LoopConfig()
+    semantic: SemanticConfig = SemanticConfig()
+    semantic_paper: PaperSemanticConfig = PaperSemanticConfig()
     verification: VerificationConfig = VerificationConfig()
     backend: BackendConfig = BackendConfig()
     plugins: dict[str, dict[str, Any]] = Field({}, description="settings of outside plug-ins, by plug-in name")
