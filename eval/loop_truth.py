@@ -6,7 +6,7 @@ wrong place where the larger is under 0.1, and not scored between. Distance alon
 look away from each other.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Protocol
@@ -30,7 +30,7 @@ TRUE_OVERLAP = 0.5
 FALSE_OVERLAP = 0.1
 MIN_GAP = 5.0
 POSE_TOLERANCE = 0.20
-ANGLE_TOLERANCE = np.radians(10.0)
+ANGLE_TOLERANCE = 10.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -84,6 +84,15 @@ class LoopJudgement(StrEnum):
     TRUE = "true"
     INACCURATE = "inaccurate"
     FALSE = "false"
+
+
+@dataclass(frozen=True, slots=True)
+class JudgedLoop:
+    """A loop against ground truth: its kind, and the error of its relative pose in metres and degrees."""
+
+    judgement: LoopJudgement
+    translation_m: float
+    rotation_deg: float
 
 
 def make_view(depth: Float32Array, intrinsics: Intrinsics) -> DepthView:
@@ -146,13 +155,13 @@ class DepthReader(Protocol):
 
 
 def judge_loops(
-    loops: Sequence[LoopConstraint], keyframes: Mapping[int, Keyframe], truth: Trajectory, read_depth: DepthReader
-) -> list[LoopJudgement | None]:
+    loops: Sequence[LoopConstraint], keyframes: Sequence[Keyframe], truth: Trajectory, read_depth: DepthReader
+) -> list[JudgedLoop | None]:
     """Compare loops with the truth: "true" within 0.20 m and 10 degrees, else "false" where views do not overlap.
 
     Args:
         loops: accepted constraints.
-        keyframes: by id; both of each loop.
+        keyframes: keyframe ``i`` has id ``i``.
         truth: ground-truth poses T_world_cam.
         read_depth: called for the frames of loops whose pose is off, to tell a wrong place from a poor fit.
 
@@ -163,19 +172,20 @@ def judge_loops(
 
 
 def _judge(
-    loop: LoopConstraint, keyframes: Mapping[int, Keyframe], truth: Trajectory, read_depth: DepthReader
-) -> LoopJudgement | None:
+    loop: LoopConstraint, keyframes: Sequence[Keyframe], truth: Trajectory, read_depth: DepthReader
+) -> JudgedLoop | None:
     pair = keyframes[loop.candidate.match], keyframes[loop.candidate.query]
     poses, covered = poses_at(truth, [keyframe.timestamp for keyframe in pair])
     if not covered.all():
         return None
     T_match_query = invert(poses[0]) @ poses[1]
     error = invert(T_match_query) @ loop.T_match_query
-    if np.linalg.norm(error[:3, 3]) <= POSE_TOLERANCE and rotation_angle(error) <= ANGLE_TOLERANCE:
-        return LoopJudgement.TRUE
+    metres, degrees = float(np.linalg.norm(error[:3, 3])), float(np.degrees(rotation_angle(error)))
+    if metres <= POSE_TOLERANCE and degrees <= ANGLE_TOLERANCE:
+        return JudgedLoop(LoopJudgement.TRUE, metres, degrees)
     match, query = (make_view(read_depth(keyframe.frame_index), keyframe.intrinsics) for keyframe in pair)
     wrong_place = max(overlap_between(match, query, T_match_query)) < FALSE_OVERLAP
-    return LoopJudgement.FALSE if wrong_place else LoopJudgement.INACCURATE
+    return JudgedLoop(LoopJudgement.FALSE if wrong_place else LoopJudgement.INACCURATE, metres, degrees)
 
 
 def _sees(view: DepthView, points: npt.NDArray[np.floating]) -> BoolArray:

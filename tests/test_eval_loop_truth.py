@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from eval.loop_truth import LoopJudgement, LoopTruth, find_loop_truth, judge_loops, make_view, overlap_between
 from semslam.camera import Intrinsics
-from semslam.geometry import Float32Array, FloatArray, exp_so3, invert, make_transform
+from semslam.geometry import Float32Array, FloatArray, exp_so3, invert, make_transform, rotation_angle
 from semslam.types import Cloud, Features, Keyframe, LoopCandidate, LoopConstraint, Trajectory
 
 CAMERA = Intrinsics(640, 480, 320.0, 320.0, 320.0, 240.0)
@@ -112,13 +112,17 @@ def keyframe(index: int, timestamp: float) -> Keyframe:
 )
 def test_judgement_of_a_loop(true_offset: float, error: FloatArray, judgement: LoopJudgement) -> None:
     truth = Trajectory(np.array([0.0, 10.0]), np.stack([np.eye(4), beside(true_offset)]))
-    keyframes = {0: keyframe(0, 0.0), 1: keyframe(1, 10.0)}
+    keyframes = [keyframe(0, 0.0), keyframe(1, 10.0)]
     loop = LoopConstraint(LoopCandidate(1, 0, 1.0, "test"), beside(true_offset) @ error, np.eye(6), 1, 0, 1, 50, "icp")
 
     def read_depth(frame_index: int) -> Float32Array:
         return WALL
 
-    assert judge_loops([loop], keyframes, truth, read_depth) == [judgement]
+    (judged,) = judge_loops([loop], keyframes, truth, read_depth)
+    assert judged is not None
+    assert judged.judgement is judgement
+    assert judged.translation_m == pytest.approx(np.linalg.norm(error[:3, 3]))
+    assert judged.rotation_deg == pytest.approx(np.degrees(rotation_angle(error)))
     uncovered = Trajectory(np.array([0.0, 0.05]), np.stack([np.eye(4)] * 2))
     assert judge_loops([loop], keyframes, uncovered, read_depth) == [None]
 
