@@ -1,11 +1,11 @@
 """The algorithm: a frame in, a state out. It reads no files, writes none and prints nothing."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
 
-from backend.pose_graph import GraphSolution, PoseGraph
+from backend.pose_graph import GraphSolution, PosedGraph, PoseGraph
 from frontend.keyframes import KeyframePolicy, make_keyframe
 from frontend.odometry import Odometry
 from loop.detector import LoopDetector
@@ -62,14 +62,16 @@ class SlamResult:
         candidates: what the detector proposed, in order.
         outcomes: what the verification made of each candidate.
         solution: optimised keyframe poses and a verdict for each verified loop.
+        graph: the optimised poses with odometry and the accepted loops.
         poses: (N, 4, 4) optimised T_world_cam of every frame.
-        components: for each frame the map it ends in; maps that a loop joined share a number.
+        components: for each frame the map it ends in, 0 the largest; maps that a loop joined share a number.
     """
 
     frames: tuple[FrameState, ...]
     keyframes: tuple[Keyframe, ...]
     outcomes: tuple[LoopConstraint | LoopRejection, ...]
     solution: GraphSolution
+    graph: PosedGraph
     poses: FloatArray
     components: tuple[int, ...]
 
@@ -80,10 +82,11 @@ class SlamResult:
 
 
 @dataclass(slots=True)
-class _SinceKeyframe:
-    """Uncertainty of the motion since the last keyframe, in the current camera's tangent space."""
+class _Anchor:
+    """The last keyframe of a map, and the uncertainty (6, 6) of the motion since, in the current camera's tangent."""
 
-    covariance: FloatArray = field(default_factory=lambda: np.zeros((6, 6)))
+    keyframe: Keyframe
+    covariance: FloatArray
 
     def extend(self, motion: Motion) -> None:
         carry = adjoint(invert(motion.T_prev_cur))
@@ -123,7 +126,7 @@ class Slam:
         self._extractor = FeatureExtractor(config.features)
         self._policy = KeyframePolicy(config.keyframes)
         self._T_odom_cam: FloatArray = np.eye(4)
-        self._since_keyframe = _SinceKeyframe()
+        self._anchors: dict[int, _Anchor] = {}
         self._frames: list[FrameState] = []
         self._keyframes: list[Keyframe] = []
         self._outcomes: list[LoopConstraint | LoopRejection] = []
@@ -151,6 +154,11 @@ class Slam:
             stopwatch=stopwatch or Stopwatch(),
         )
 
+    @property
+    def keyframes(self) -> tuple[Keyframe, ...]:
+        """The keyframes so far."""
+        return tuple(self._keyframes)
+
     def process(self, frame: Frame) -> FrameState:
         """Track a frame and, where it is due, make it a keyframe and look for loops.
 
@@ -160,7 +168,8 @@ class Slam:
         with self._stopwatch.stage("odometry"):
             motion = self._odometry.track(frame)
         self._T_odom_cam = orthonormalise(self._T_odom_cam @ motion.T_prev_cur)
-        self._since_keyframe.extend(motion)
+        for anchor in self._anchors.values():
+            anchor.extend(motion)
         keyframe = None
         if motion.status is not TrackingStatus.LOST and self._policy.is_due(
             frame.timestamp, self._T_odom_cam, motion.map_id
@@ -178,15 +187,21 @@ class Slam:
         return state
 
     def finish(self) -> SlamResult:
-        """Optimise the graph and recover every frame's pose; may be called at any time, also more than once."""
+        """Optimise the graph and recover every frame's pose; may be called at any time, also more than once.
+
+        Raises:
+            GraphError: nothing was tracked yet, or the optimiser failed.
+        """
         with self._stopwatch.stage("optimize"):
             solution = self._graph.optimize()
         components = self._components(solution)
+        unplaced = len(solution.components)
         return SlamResult(
             frames=tuple(self._frames),
             keyframes=tuple(self._keyframes),
             outcomes=tuple(self._outcomes),
             solution=solution,
+            graph=self._graph.snapshot(solution),
             poses=recover_poses(
                 np.array([state.timestamp for state in self._frames]),
                 np.array([state.T_odom_cam for state in self._frames]).reshape(-1, 4, 4),
@@ -194,7 +209,7 @@ class Slam:
                 self._keyframes,
                 solution.poses,
             ),
-            components=tuple(components[state.map_id] for state in self._frames),
+            components=tuple(components.get(state.map_id, unplaced) for state in self._frames),
         )
 
     def _add_keyframe(self, frame: Frame, motion: Motion) -> Keyframe:
@@ -217,11 +232,11 @@ class Slam:
 
     def _connect(self, keyframe: Keyframe) -> None:
         self._graph.add_keyframe(keyframe.id, keyframe.T_odom_cam)
-        if self._keyframes and self._keyframes[-1].map_id == keyframe.map_id:
-            previous = self._keyframes[-1]
-            T_previous_this = invert(previous.T_odom_cam) @ keyframe.T_odom_cam
-            self._graph.add_odometry(previous.id, keyframe.id, T_previous_this, self._since_keyframe.covariance)
-        self._since_keyframe = _SinceKeyframe()
+        last = self._anchors.get(keyframe.map_id)
+        if last is not None:
+            T_last_this = invert(last.keyframe.T_odom_cam) @ keyframe.T_odom_cam
+            self._graph.add_odometry(last.keyframe.id, keyframe.id, T_last_this, last.covariance)
+        self._anchors[keyframe.map_id] = _Anchor(keyframe, np.zeros((6, 6)))
 
     def _close_loops(self, frame: Frame, keyframe: Keyframe) -> None:
         labels = None
@@ -240,11 +255,6 @@ class Slam:
                 self._graph.add_loop(outcome)
 
     def _components(self, solution: GraphSolution) -> dict[int, int]:
-        """Which maps belong together once accepted loops join them: map id -> smallest map id of its group."""
-        group = {state.map_id: state.map_id for state in self._frames}
-        for verdict in solution.verdicts:
-            if verdict.accepted:
-                candidate = verdict.constraint.candidate
-                a, b = (group[self._keyframes[k].map_id] for k in (candidate.query, candidate.match))
-                group = {map_id: min(a, b) if g in (a, b) else g for map_id, g in group.items()}
-        return group
+        """For each map of the odometry the place of its component in ``solution.components``, the largest first."""
+        place = {key: index for index, keys in enumerate(solution.components) for key in keys}
+        return {keyframe.map_id: place[keyframe.id] for keyframe in self._keyframes}

@@ -1,0 +1,64 @@
+"""The commands joined, and what happens when one of them fails."""
+
+import os
+import signal
+import sys
+
+import typer
+
+from semslam import __version__
+from semslam.cli import environment, models, runs, scores
+from semslam.cli.console import complain
+from semslam.errors import SemslamError
+
+INTERRUPTED = 130
+FAILED = 2
+
+app = typer.Typer(
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="rich",
+    help="RGB-D SLAM whose loop closures come from semantics.",
+    epilog="Examples: [bold]semslam demo[/bold]   [bold]semslam run rgbd_dataset_freiburg1_room[/bold]   "
+    "[bold]semslam compare DIR --detectors none,semantic[/bold]",
+)
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"semslam {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def root(
+    version: bool = typer.Option(False, "--version", callback=_print_version, is_eager=True, help="Print the version."),
+) -> None:
+    """RGB-D SLAM whose loop closures come from semantics."""
+
+
+for module in (runs, scores, models, environment):
+    for command in module.COMMANDS:
+        app.command(command.name, help=command.help, epilog=command.epilog)(command.run)
+
+
+def main() -> None:
+    """Run the command line; what a user can mend ends in one sentence and exit code 2, Ctrl-C in 130."""
+    try:
+        app()
+    except SemslamError as error:
+        complain(str(error))
+        sys.exit(FAILED)
+    except KeyboardInterrupt:
+        complain("Interrupted.")
+        sys.exit(INTERRUPTED)
+    except BrokenPipeError:
+        # The reader of a pipe has gone; say nothing more, not even while Python closes standard output.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(128 + signal.SIGPIPE)
+    except OSError as error:
+        complain(f"{error.filename or 'A file'}: {(error.strerror or str(error)).lower()}.")
+        sys.exit(FAILED)
+    except MemoryError:
+        complain("There is not enough memory for this; try --max-frames or a larger machine.")
+        sys.exit(FAILED)

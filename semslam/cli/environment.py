@@ -1,0 +1,89 @@
+"""semslam config, doctor, download."""
+
+import platform
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from semslam.cli import options
+from semslam.cli.command import Command, example
+from semslam.cli.console import bar, out
+from semslam.errors import SemslamError
+
+PACKAGES = (
+    "numpy",
+    "opencv-python-headless",
+    "open3d",
+    "gtsam",
+    "torch",
+    "onnxruntime",
+    "scikit-learn",
+    "kiss-icp",
+    "evo",
+)
+MODULES = {"opencv-python-headless": "cv2", "scikit-learn": "sklearn", "kiss-icp": "kiss_icp"}
+
+
+def config_command(config: options.ConfigFile = None, overrides: options.Settings = None) -> None:
+    """Print the effective settings as YAML."""
+    typer.echo(options.settings(config, overrides).dump(), nl=False)
+
+
+def doctor_command() -> None:
+    """Check that everything a run needs is here."""
+    from semslam import plugins
+    from semslam.config import Config
+
+    problems: list[str] = []
+    out.print(f"Python {platform.python_version()}, {platform.system()} {platform.machine()}")
+    for package in PACKAGES:
+        found = _import_version(package)
+        out.print(f"{package}: {found}", soft_wrap=True)
+        if found.startswith("missing"):
+            problems.append(package)
+    try:
+        segmenter = plugins.load("semslam.segmenters", Config().segmentation.name).from_config(Config())
+        out.print(f"segmentation network: {len(segmenter.names) - 1} classes")
+    except (SemslamError, ImportError) as error:
+        out.print(f"segmentation network: missing ({error})", soft_wrap=True)
+        problems.append("segmentation network")
+    for group in plugins.GROUPS:
+        out.print(f"{group}: {', '.join(plugins.names(group))}", soft_wrap=True)
+    if problems:
+        raise SemslamError(f"Not usable here: {', '.join(problems)}.")
+    out.print("All is well.")
+
+
+def download_command(
+    name: Annotated[str, typer.Argument(help="A sequence's short name, such as fr1/room.")],
+    directory: Annotated[Path, typer.Argument(help="Folder to unpack it in.")] = Path("data"),
+    base_url: Annotated[str | None, typer.Option(help="A mirror to take it from.")] = None,
+) -> None:
+    """Fetch a TUM RGB-D sequence; an interrupted download goes on where it stopped."""
+    from semslam.datasets.download import BASE_URL, download
+
+    with bar(name, None, "bytes") as update:
+        path = download(name, directory, progress=lambda done, total: update(done), base_url=base_url or BASE_URL)
+    out.print(f"Unpacked to {path}", soft_wrap=True)
+
+
+def _import_version(package: str) -> str:
+    try:
+        __import__(MODULES.get(package, package))
+        return version(package)
+    except (ImportError, OSError, PackageNotFoundError) as error:
+        return f"missing ({error})"
+
+
+COMMANDS = (
+    Command("config", config_command, "Print the effective settings as YAML.", example("semslam config > my.yaml")),
+    Command("doctor", doctor_command, "Check that everything a run needs is here."),
+    Command(
+        "download",
+        download_command,
+        "Fetch a TUM RGB-D sequence by its short name.",
+        example("semslam download fr1/room", "semslam download fr3/long_office data"),
+    ),
+)

@@ -1,0 +1,46 @@
+"""Options that several commands share."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from semslam.config import Config, load_config, parse_overrides
+
+Sequence = Annotated[str, typer.Argument(help="A sequence: a folder (TUM, 7-Scenes, generic), a .bag or synthetic:...")]
+Odometry = Annotated[str | None, typer.Option("--odometry", help="Registered odometry.")]
+Detector = Annotated[str | None, typer.Option("--detector", help="Registered loop detector; 'none' for no loops.")]
+Loader = Annotated[str | None, typer.Option("--loader", help="Dataset loader; guessed from the path by default.")]
+ConfigFile = Annotated[Path | None, typer.Option("--config", help="YAML settings (see 'semslam config').")]
+Settings = Annotated[list[str] | None, typer.Option("--set", help="A setting, section.key=value; may be repeated.")]
+Seed = Annotated[int | None, typer.Option("--seed", min=0, help="Seed of everything random.")]
+Start = Annotated[int, typer.Option("--start", min=0, help="First frame.")]
+MaxFrames = Annotated[int | None, typer.Option("--max-frames", min=1, help="Frames at the most.")]
+Stride = Annotated[int, typer.Option("--stride", min=1, help="Take every n-th frame.")]
+Json = Annotated[bool, typer.Option("--json", help="Print JSON on standard output.")]
+
+
+def settings(
+    config: Path | None = None,
+    overrides: list[str] | None = None,
+    odometry: str | None = None,
+    detector: str | None = None,
+    seed: int | None = None,
+    loader: str | None = None,
+    start: int = 0,
+    max_frames: int | None = None,
+    stride: int = 1,
+) -> Config:
+    """Join the settings file, ``--set`` texts and the named options, the later winning."""
+    loaded = load_config(config, parse_overrides(overrides or []))
+    named = {"odometry": odometry, "detector": detector, "seed": seed}
+    frames = {
+        "loader": loader,
+        "start": start or None,
+        "max_frames": max_frames,
+        "stride": stride if stride > 1 else None,
+    }
+    return loaded.with_changes(
+        **{key: value for key, value in named.items() if value is not None},
+        dataset={key: value for key, value in frames.items() if value is not None},
+    )

@@ -1,0 +1,171 @@
+"""semslam run, compare, demo."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from semslam.cli import options
+from semslam.cli.command import Command, example
+from semslam.cli.console import bar, frame_progress, metrics_table, out, remark, remarks
+from semslam.config import Config
+from semslam.errors import ConfigError, ResultsError
+
+if TYPE_CHECKING:
+    from semslam.datasets.dataset import Dataset
+    from semslam.metrics import Metrics
+
+RUNS = Path("runs")
+DEMO_SEQUENCE = "synthetic:house"
+DEMO_DETECTORS = "none,semantic"
+
+OutDirectory = Annotated[Path | None, typer.Option("--out", help="The run folder itself (default: runs/...).")]
+Plots = Annotated[bool, typer.Option("--plots/--no-plots", help="Draw plots and the report.")]
+
+
+def run_command(
+    sequence: options.Sequence,
+    detector: options.Detector = None,
+    odometry: options.Odometry = None,
+    out_directory: OutDirectory = None,
+    config: options.ConfigFile = None,
+    overrides: options.Settings = None,
+    seed: options.Seed = None,
+    start: options.Start = 0,
+    max_frames: options.MaxFrames = None,
+    stride: options.Stride = 1,
+    loader: options.Loader = None,
+    plots: Plots = True,
+) -> None:
+    """Run SLAM over a sequence and write a run folder."""
+    from semslam.datasets import open_dataset
+    from semslam.results import link_latest, new_run_directory
+
+    chosen = options.settings(config, overrides, odometry, detector, seed, loader, start, max_frames, stride)
+    dataset = open_dataset(sequence, chosen.dataset)
+    directory = out_directory or new_run_directory(RUNS, dataset.name, chosen.detector)
+    metrics = _run_one(dataset, chosen, directory, plots)
+    if out_directory is None:
+        link_latest(directory)
+    out.print(metrics_table([metrics], f"{dataset.name}: {metrics.frames} frames"))
+    out.print(f"Results: {directory}", soft_wrap=True)
+    if metrics.interrupted:
+        raise KeyboardInterrupt
+
+
+def compare_command(
+    sequence: options.Sequence,
+    detectors: Annotated[str, typer.Option("--detectors", help="Names joined by commas.")] = DEMO_DETECTORS,
+    odometry: options.Odometry = None,
+    out_directory: Annotated[Path | None, typer.Option("--out", help="Folder of the run folders.")] = None,
+    config: options.ConfigFile = None,
+    overrides: options.Settings = None,
+    seed: options.Seed = None,
+    start: options.Start = 0,
+    max_frames: options.MaxFrames = None,
+    stride: options.Stride = 1,
+    loader: options.Loader = None,
+    plots: Plots = True,
+) -> None:
+    """Run a sequence once per detector, all else equal, and print the figures side by side."""
+    from semslam.datasets import open_dataset
+    from semslam.results import link_latest, new_run_directory
+
+    chosen = options.settings(config, overrides, odometry, None, seed, loader, start, max_frames, stride)
+    dataset = open_dataset(sequence, chosen.dataset)
+    directory = out_directory or new_run_directory(RUNS, dataset.name, "compare")
+    _compare(dataset, chosen, _names(detectors), directory, plots)
+    if out_directory is None:
+        link_latest(directory)
+
+
+def demo_command(
+    out_directory: Annotated[Path, typer.Option("--out", help="Folder of the run folders.")] = RUNS / "demo",
+    seed: options.Seed = None,
+) -> None:
+    """Run the embedded sequence without and with semantic loops, and show what the loops bring."""
+    from semslam.datasets import open_dataset
+
+    chosen = options.settings(None, None, seed=seed)
+    dataset = open_dataset(DEMO_SEQUENCE, chosen.dataset)
+    alone, closed = _compare(dataset, chosen, _names(DEMO_DETECTORS), out_directory, plots=True)
+    before, after = alone.optimized.ate_rmse_m, closed.optimized.ate_rmse_m
+    if before is not None and after is not None:
+        out.print(
+            f"Semantic loops lower the ATE from {100 * before:.1f} to {100 * after:.1f} cm: {before / after:.1f}-fold."
+        )
+    out.print(f"Open {out_directory / 'semantic' / 'report.html'} to see every loop.", soft_wrap=True)
+
+
+def _names(text: str) -> list[str]:
+    from semslam.plugins import load
+
+    names = [name.strip() for name in text.split(",") if name.strip()]
+    if not names or len(set(names)) != len(names):
+        raise ConfigError("Name at least one detector, and each only once.")
+    for name in names:
+        load("semslam.detectors", name)
+    return names
+
+
+def _compare(
+    dataset: "Dataset", config: Config, detectors: Sequence[str], directory: Path, plots: bool
+) -> list["Metrics"]:
+    from semslam.results import write_json
+
+    runs: list[Metrics] = []
+    for name in detectors:
+        runs.append(_run_one(dataset, config.with_changes(detector=name), directory / name, plots))
+        write_json(directory / "compare.json", [run.model_dump(mode="json") for run in runs])
+        if runs[-1].interrupted:
+            break
+    out.print(metrics_table(runs, f"{dataset.name}: {runs[0].frames} frames"))
+    out.print(f"Results: {directory}", soft_wrap=True)
+    if runs[-1].interrupted:
+        raise KeyboardInterrupt
+    return runs
+
+
+def _run_one(dataset: "Dataset", config: Config, directory: Path, plots: bool) -> "Metrics":
+    from semslam.pipeline import run
+    from semslam.results import check_writable, write_run
+
+    check_writable(directory)
+    with bar(f"{dataset.name} {config.detector}", len(dataset)) as update:
+        result = run(dataset, config, frame_progress(update))
+    remarks(result.notes)
+    try:
+        write_run(result, dataset, directory, plots)
+    except ResultsError:
+        # Hours of tracking must not die with a full disk: show what was found before saying so.
+        remark("The run is finished, but could not be saved.")
+        out.print(metrics_table([result.metrics], dataset.name))
+        raise
+    return result.metrics
+
+
+COMMANDS = (
+    Command(
+        "run",
+        run_command,
+        "Run SLAM over a sequence and write a run folder: trajectory, graph, loop ledger, map, plots, report.",
+        example(
+            "semslam run rgbd_dataset_freiburg1_room",
+            "semslam run DIR --detector none --odometry dense",
+            "semslam run DIR --set keyframes.interval=0.5",
+        ),
+    ),
+    Command(
+        "compare",
+        compare_command,
+        "Run a sequence once per detector, all else equal, and print the figures side by side.",
+        example("semslam compare DIR --detectors none,semantic"),
+    ),
+    Command(
+        "demo",
+        demo_command,
+        "Run the embedded sequence without and with semantic loops.",
+        example("semslam demo"),
+    ),
+)

@@ -1,0 +1,137 @@
+"""A finished run against ground truth: trajectories, loops, figures."""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from eval.loop_truth import LoopJudgement, judge_loops
+from eval.trajectory import TrajectoryScore, coverage, score_trajectory
+from semslam.config import Config
+from semslam.datasets.dataset import Dataset
+from semslam.errors import TrajectoryError
+from semslam.ledger import GraphVerdict, LedgerEntry, rejected_entry, verified_entry
+from semslam.metrics import LoopMetrics, Metrics, TimeMetrics, TrajectoryMetrics
+from semslam.slam import FrameState, SlamResult
+from semslam.types import LoopConstraint, TrackingStatus, Trajectory
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scores:
+    """What scoring makes of a run.
+
+    Attributes:
+        odometry: causal trajectory, tracked frames of the odometry's largest map.
+        trajectory: final trajectory, tracked frames of the largest map.
+        ledger: one entry per candidate.
+        metrics: all figures.
+    """
+
+    odometry: Trajectory
+    trajectory: Trajectory
+    ledger: tuple[LedgerEntry, ...]
+    metrics: Metrics
+
+
+def score_run(
+    dataset: Dataset, config: Config, slam: SlamResult, unreadable: int, interrupted: bool, time: TimeMetrics
+) -> Scores:
+    """Score a run; without ground truth, or where it meets fewer than three poses, the errors are None."""
+    truth = dataset.ground_truth
+    odometry, trajectory = _trajectories(slam)
+    ledger = _ledger(dataset, slam)
+    stamps = [state.timestamp for state in slam.frames]
+    metrics = Metrics(
+        sequence=dataset.name,
+        detector=config.detector,
+        odometry=config.odometry,
+        seed=config.seed,
+        frames=len(slam.frames) + unreadable,
+        unreadable=unreadable,
+        tracked=len(trajectory),
+        lost_intervals=lost_intervals(slam.frames),
+        keyframes=len(slam.keyframes),
+        ground_truth_coverage=None if truth is None else coverage(stamps, truth),
+        odometry_only=TrajectoryMetrics.from_score(_score(odometry, truth)),
+        optimized=TrajectoryMetrics.from_score(_score(trajectory, truth)),
+        maps=len(slam.solution.components),
+        loops=_loop_metrics(slam, ledger, truth is not None),
+        time=time,
+        interrupted=interrupted,
+    )
+    return Scores(odometry, trajectory, ledger, metrics)
+
+
+def lost_intervals(frames: Sequence[FrameState]) -> list[tuple[float, float]]:
+    """First and last stamp, in seconds, of each run of lost frames."""
+    intervals: list[tuple[float, float]] = []
+    was_lost = False
+    for state in frames:
+        is_lost = state.status is TrackingStatus.LOST
+        if is_lost and was_lost:
+            intervals[-1] = (intervals[-1][0], state.timestamp)
+        elif is_lost:
+            intervals.append((state.timestamp, state.timestamp))
+        was_lost = is_lost
+    return intervals
+
+
+def _trajectories(slam: SlamResult) -> tuple[Trajectory, Trajectory]:
+    tracked = np.array([state.status is not TrackingStatus.LOST for state in slam.frames])
+    stamps = np.array([state.timestamp for state in slam.frames])
+    map_ids = np.array([state.map_id for state in slam.frames])
+    largest_map = np.bincount(map_ids[tracked]).argmax()
+    causal = np.array([state.T_odom_cam for state in slam.frames])
+    in_odometry = tracked & (map_ids == largest_map)
+    in_final = tracked & (np.array(slam.components) == 0)
+    return (
+        Trajectory(stamps[in_odometry], causal[in_odometry]),
+        Trajectory(stamps[in_final], slam.poses[in_final]),
+    )
+
+
+def _score(estimate: Trajectory, truth: Trajectory | None) -> TrajectoryScore | None:
+    if truth is None:
+        return None
+    try:
+        return score_trajectory(estimate, truth)
+    except TrajectoryError:
+        return None
+
+
+def _ledger(dataset: Dataset, slam: SlamResult) -> tuple[LedgerEntry, ...]:
+    accepted = [verdict.constraint for verdict in slam.solution.verdicts if verdict.accepted]
+    truths = iter(_truths(dataset, slam, accepted))
+    verdicts = iter(slam.solution.verdicts)
+    entries = []
+    for outcome in slam.outcomes:
+        if not isinstance(outcome, LoopConstraint):
+            entries.append(rejected_entry(outcome, slam.keyframes))
+            continue
+        verdict = next(verdicts)
+        truth = next(truths) if verdict.accepted else None
+        graph = GraphVerdict(verdict.weight, verdict.accepted)
+        entries.append(verified_entry(outcome, slam.keyframes, graph, truth))
+    return tuple(entries)
+
+
+def _truths(dataset: Dataset, slam: SlamResult, loops: Sequence[LoopConstraint]) -> Sequence[LoopJudgement | None]:
+    if dataset.ground_truth is None:
+        return [None] * len(loops)
+    keyframes = {keyframe.id: keyframe for keyframe in slam.keyframes}
+    return judge_loops(loops, keyframes, dataset.ground_truth, lambda index: dataset.frame(index).depth)
+
+
+def _loop_metrics(slam: SlamResult, ledger: Sequence[LedgerEntry], truth_is_known: bool) -> LoopMetrics:
+    kinds = Counter(entry.truth for entry in ledger if entry.truth is not None)
+    accepted = sum(verdict.accepted for verdict in slam.solution.verdicts)
+    known = truth_is_known and (accepted == 0 or bool(kinds))
+    return LoopMetrics(
+        proposed=len(slam.outcomes),
+        verified=len(slam.solution.verdicts),
+        accepted=accepted,
+        true=kinds["true"] if known else None,
+        inaccurate=kinds["inaccurate"] if known else None,
+        false=kinds["false"] if known else None,
+    )
