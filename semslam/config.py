@@ -10,7 +10,6 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from semslam.errors import ConfigError
 
-
 Interval = tuple[float, float]
 
 
@@ -72,6 +71,39 @@ class KeyframeConfig(Section):
     max_rotation: float = Field(0.35, gt=0, description="radians of motion that make one sooner")
     cloud_voxel: float = Field(0.04, gt=0, description="metres; grid that thins the stored cloud")
     max_depth: float = Field(6.0, gt=0, description="metres; farther points are not stored")
+
+
+class FeatureOdometryConfig(Section):
+    """Odometry from ORB matches and PnP, frame to frame."""
+
+    min_inliers: int = Field(15, gt=5, description="matches that must agree on a motion")
+    threshold_px: float = Field(3.0, gt=0, description="reprojection error up to which a match agrees")
+    covariance_scale: float = Field(1.0, gt=0, description="factor that calibrates the covariance")
+
+
+class DenseConfig(Section):
+    """Dense RGB-D odometry."""
+
+    max_depth: float = Field(4.0, gt=0, description="metres; farther depth is not used")
+    steps: tuple[int, ...] = Field((10, 5, 3), min_length=1, description="iterations, coarsest level first")
+    min_coverage: float = Field(0.05, gt=0, le=1, description="share of pixels that must have depth")
+    min_contrast: float = Field(4.0, ge=0, description="standard deviation of grey values that an image must have")
+    min_fitness: float = Field(0.3, gt=0, le=1, description="share of pixels that must agree on a motion")
+    sigma: float = Field(0.3, gt=0, description="metres; error of one pixel's depth that calibrates the covariance")
+
+
+class KissConfig(Section):
+    """KISS-ICP with a preset for depth cameras."""
+
+    max_range: float = Field(4.0, gt=0, description="metres; farther points are not used")
+    voxel: float = Field(0.04, gt=0, description="metres; voxel size of the local map")
+    initial_threshold: float = Field(0.1, gt=0, description="metres; first association threshold")
+    min_motion: float = Field(0.01, gt=0, description="metres; smaller deviations do not adapt the threshold")
+    stride: int = Field(4, gt=0, description="every n-th pixel in both directions is used")
+    min_points: int = Field(500, gt=10, description="points that a scan must have")
+    max_surprise: float = Field(0.3, gt=0, description="metres between prediction and result that mean failure")
+    max_surprise_rotation: float = Field(0.5, gt=0, description="radians, the same")
+    sigma: float = Field(0.3, gt=0, description="metres; error of one point that calibrates the covariance")
 
 
 class SegmentationConfig(Section):
@@ -216,6 +248,9 @@ class Config(Section):
     dataset: DatasetConfig = DatasetConfig()
     features: FeatureConfig = FeatureConfig()
     keyframes: KeyframeConfig = KeyframeConfig()
+    feature: FeatureOdometryConfig = FeatureOdometryConfig()
+    dense: DenseConfig = DenseConfig()
+    kiss: KissConfig = KissConfig()
     segmentation: SegmentationConfig = SegmentationConfig()
     training: TrainingConfig = TrainingConfig()
     loops: LoopConfig = LoopConfig()

@@ -34,6 +34,7 @@ DATASETS: dict[str, str] = {
     "tum": "semslam.datasets.tum:TumDataset",
     "seven_scenes": "semslam.datasets.seven_scenes:SevenScenesDataset",
     "folder": "semslam.datasets.folder:FolderDataset",
+    "rosbag": "semslam.datasets.rosbag:RosbagDataset",
     "synthetic": "semslam.datasets.synthetic:SyntheticDataset",
 }
 GROUPS: dict[str, Mapping[str, str]] = {
