@@ -1,0 +1,95 @@
+"""Trajectories in the TUM text format: ``timestamp tx ty tz qx qy qz qw`` in seconds and metres, T_world_cam."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+
+from semslam.errors import TrajectoryError
+from semslam.geometry import FloatArray, quaternions_to_rotations, rotations_to_quaternions
+from semslam.types import Trajectory
+
+COLUMNS = "timestamp tx ty tz qx qy qz qw"
+UNIT_TOLERANCE = 0.01
+"""How far a quaternion's norm may be off 1 before it is worth a note; files with four decimals are off by 1e-4."""
+
+
+def read_trajectory(path: str | Path) -> tuple[Trajectory, list[str]]:
+    """Read a TUM trajectory, mending what real files have wrong with them.
+
+    Comments and empty lines are skipped. Rows with a figure that is not finite or without a rotation are dropped,
+    unsorted rows are sorted, of rows with the same stamp the first is kept. Quaternions are normalised.
+
+    Args:
+        path: the text file.
+
+    Returns:
+        The trajectory and what was mended, a sentence each.
+
+    Raises:
+        TrajectoryError: the file cannot be read, is no such table, or no row of it is usable.
+    """
+    path = Path(path)
+    rows = _read_table(path)
+    notes = []
+    usable = np.isfinite(rows).all(axis=1) & (np.linalg.norm(rows[:, 4:], axis=1) > 1e-6)
+    if dropped := int((~usable).sum()):
+        notes.append(f"{path.name}: {dropped} of {len(rows)} rows were dropped: not finite, or without a rotation.")
+    rows = rows[usable]
+    if not len(rows):
+        raise TrajectoryError(f"The trajectory {path} holds no usable pose ({dropped} rows were not finite).")
+    if (np.diff(rows[:, 0]) < 0).any():
+        notes.append(f"{path.name}: the rows were not in order of time and have been sorted.")
+    stamps, first = np.unique(rows[:, 0], return_index=True)
+    if doubled := len(rows) - len(stamps):
+        notes.append(f"{path.name}: {doubled} rows repeat a time stamp; the first of each was kept.")
+    rows = rows[first]
+    norms = np.linalg.norm(rows[:, 4:], axis=1)
+    if far := int((np.abs(norms - 1) > UNIT_TOLERANCE).sum()):
+        notes.append(f"{path.name}: {far} quaternions were far from unit length and have been normalised.")
+    poses = np.tile(np.eye(4), (len(rows), 1, 1))
+    poses[:, :3, :3] = quaternions_to_rotations(rows[:, 4:])
+    poses[:, :3, 3] = rows[:, 1:4]
+    return Trajectory(stamps, poses), notes
+
+
+def _read_table(path: Path) -> FloatArray:
+    try:
+        lines = [line for line in path.read_text(encoding="utf-8-sig").splitlines() if line.split("#", 1)[0].strip()]
+    except (OSError, UnicodeDecodeError) as error:
+        reason = error.strerror if isinstance(error, OSError) else "it is not text"
+        raise TrajectoryError(f"The trajectory {path} cannot be read: {reason}.") from error
+    if not lines:
+        raise TrajectoryError(f"The trajectory {path} holds no poses.")
+    separator = "," if "," in lines[0] else None
+    try:
+        rows = np.loadtxt(lines, dtype=np.float64, comments="#", delimiter=separator, ndmin=2)
+    except ValueError as error:
+        reason = str(error).split(";")[0].rstrip(".")
+        raise TrajectoryError(f"{path} is no TUM trajectory ({COLUMNS}): {reason}.") from error
+    if rows.shape[1] != 8:
+        raise TrajectoryError(f"{path} is no TUM trajectory ({COLUMNS}): its rows have {rows.shape[1]} columns.")
+    return rows
+
+
+def write_trajectory(path: str | Path, trajectory: Trajectory) -> None:
+    """Write a TUM trajectory: nine decimals, whole or not at all.
+
+    Args:
+        path: the text file; its folder must exist.
+        trajectory: T_world_cam over time.
+
+    Raises:
+        TrajectoryError: the file cannot be written.
+    """
+    path = Path(path)
+    quaternions = rotations_to_quaternions(trajectory.poses[:, :3, :3])
+    rows = np.column_stack([trajectory.timestamps, trajectory.poses[:, :3, 3], quaternions])
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        with temporary.open("w", encoding="utf-8") as stream:
+            np.savetxt(stream, rows, fmt="%.9f", header=COLUMNS, comments="# ")
+        temporary.replace(path)
+    except OSError as error:
+        temporary.unlink(missing_ok=True)
+        raise TrajectoryError(f"The trajectory {path} cannot be written: {error.strerror}.") from error
