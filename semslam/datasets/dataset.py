@@ -1,8 +1,10 @@
-"""The role of a dataset."""
+"""The role of a dataset, and of a loader that opens one."""
 
 from collections.abc import Iterator
-from typing import Protocol, runtime_checkable
+from pathlib import Path
+from typing import ClassVar, Protocol, Self, runtime_checkable
 
+from semslam.config import DatasetConfig
 from semslam.types import Frame, Intrinsics, Trajectory
 
 
@@ -46,3 +48,26 @@ class Dataset(Protocol):
 
     def __iter__(self) -> Iterator[Frame]:
         """Frames in order."""
+
+
+class DatasetLoader(Dataset, Protocol):
+    """A dataset class that can be registered: it opens a path, and may say which paths are its own.
+
+    Attributes:
+        layout: what a path of this kind looks like, for the error that names what was looked for.
+    """
+
+    layout: ClassVar[str]
+
+    @classmethod
+    def recognises(cls, path: Path) -> bool:
+        """Whether an existing path has this layout; looks at names alone and reads no image."""
+
+    @classmethod
+    def open(cls, path: str | Path, config: DatasetConfig) -> Self:
+        """Read the sequence's lists, but no image. The caller applies start, stride, max_frames and the faults.
+
+        Raises:
+            DatasetError: the path holds no usable sequence of this kind.
+            TrajectoryError: its ground truth is not readable.
+        """

@@ -1,0 +1,106 @@
+"""camera.yaml: the camera of a sequence, written beside its images."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from semslam.camera import NO_DISTORTION, Intrinsics
+from semslam.errors import ConfigError, DatasetError
+
+CAMERA_FILE = "camera.yaml"
+_REQUIRED = ("width", "height", "fx", "fy", "cx", "cy")
+_OPTIONAL = ("distortion", "depth_scale")
+
+
+@dataclass(frozen=True, slots=True)
+class CameraSetup:
+    """What turns a sequence's files into metres.
+
+    Attributes:
+        intrinsics: the camera; fy is positive.
+        depth_scale: units of the depth images per metre, or None where the source does not say.
+        y_up: the source gave a negative fy: its poses are those of a camera whose y axis points up
+            (ICL-NUIM), and have to be mirrored.
+    """
+
+    intrinsics: Intrinsics
+    depth_scale: float | None = None
+    y_up: bool = False
+
+
+def read_camera(path: Path) -> CameraSetup:
+    """Read a camera.yaml: width height fx fy cx cy, and optionally distortion (k1 k2 p1 p2 k3) and depth_scale.
+
+    A negative fy is read as in ICL-NUIM: the images are upright all the same, so the camera gets its size, and
+    ``y_up`` says that the poses are mirrored.
+
+    Raises:
+        DatasetError: the file cannot be read, or a key is missing, unknown or no usable number.
+    """
+    values = _load(path)
+    if unknown := sorted(set(values) - {*_REQUIRED, *_OPTIONAL}):
+        raise DatasetError(f"The camera file {path} has an unknown key '{unknown[0]}'.")
+    if missing := [key for key in _REQUIRED if key not in values]:
+        raise DatasetError(f"The camera file {path} lacks {', '.join(missing)}.")
+    width, height, fx, fy, cx, cy = (_number(values, key, path) for key in _REQUIRED)
+    if width != int(width) or height != int(height):
+        raise DatasetError(f"The camera file {path} gives a size that is not whole: {width} x {height}.")
+    depth_scale = _number(values, "depth_scale", path) if "depth_scale" in values else None
+    if depth_scale is not None and depth_scale <= 0:
+        raise DatasetError(f"The camera file {path} gives a depth_scale that is not positive: {depth_scale}.")
+    distortion = _distortion(values.get("distortion"), path)
+    try:
+        intrinsics = Intrinsics(int(width), int(height), fx, abs(fy), cx, cy, distortion)
+    except ConfigError as error:
+        raise DatasetError(f"The camera file {path}: {error}") from error
+    return CameraSetup(intrinsics, depth_scale, y_up=fy < 0)
+
+
+def write_camera(path: Path, intrinsics: Intrinsics, depth_scale: float) -> None:
+    """Write a camera.yaml that ``read_camera`` understands.
+
+    Args:
+        path: the file.
+        intrinsics: the camera.
+        depth_scale: units of the depth images per metre.
+
+    Raises:
+        DatasetError: the file cannot be written.
+    """
+    values = {key: getattr(intrinsics, key) for key in _REQUIRED}
+    values |= {"distortion": list(intrinsics.distortion), "depth_scale": depth_scale}
+    try:
+        path.write_text(yaml.safe_dump(values, sort_keys=False, default_flow_style=None), encoding="utf-8")
+    except OSError as error:
+        raise DatasetError(f"The camera file {path} cannot be written: {error.strerror}.") from error
+
+
+def _load(path: Path) -> dict[str, Any]:
+    try:
+        values = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise DatasetError(f"The camera file {path} cannot be read: {error.strerror}.") from error
+    except (UnicodeDecodeError, yaml.YAMLError) as error:
+        raise DatasetError(f"The camera file {path} is not YAML.") from error
+    if not isinstance(values, dict):
+        raise DatasetError(f"The camera file {path} must hold 'key: value' pairs such as 'fx: 525.0'.")
+    return {str(key): value for key, value in values.items()}
+
+
+def _number(values: dict[str, Any], key: str, path: Path) -> float:
+    value = values[key]
+    if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
+        raise DatasetError(f"The camera file {path}: '{key}' must be a number, not {value!r}.")
+    return float(value)
+
+
+def _distortion(value: Any, path: Path) -> tuple[float, float, float, float, float]:
+    if value is None:
+        return NO_DISTORTION
+    if not isinstance(value, list) or len(value) != 5:
+        raise DatasetError(f"The camera file {path}: 'distortion' must list k1 k2 p1 p2 k3.")
+    k1, k2, p1, p2, k3 = (_number({"distortion": item}, "distortion", path) for item in value)
+    return k1, k2, p1, p2, k3
