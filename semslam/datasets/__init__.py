@@ -1,1 +1,75 @@
-"""Datasets."""
+"""Data in: sequences opened by path, read frame by frame.
+
+dataset = open_dataset("rgbd_dataset_freiburg1_room")
+for frame in dataset: ...
+"""
+
+from pathlib import Path
+
+from semslam import plugins
+from semslam.config import DatasetConfig
+from semslam.datasets.dataset import Dataset, DatasetLoader
+from semslam.errors import ConfigError, DatasetError
+
+__all__ = ["Dataset", "DatasetLoader", "open_dataset"]
+
+GROUP = "semslam.datasets"
+SYNTHETIC = "synthetic"
+
+
+def open_dataset(path: str | Path, loader: str | None = None, config: DatasetConfig | None = None) -> Dataset:
+    """Open a sequence; no image is read yet.
+
+    Args:
+        path: a folder, a ROS bag, or ``synthetic:SCENE?key=value``.
+        loader: registered name of its kind; None = as the settings say, or else guessed from the path.
+        config: which frames are read, and how.
+
+    Returns:
+        The sequence with start, stride, max_frames and faults of the settings applied.
+
+    Raises:
+        DatasetError: there is no such path, it is no sequence, or its lists are not usable.
+        TrajectoryError: its ground truth is not readable.
+        ConfigError: the loader's name is unknown.
+    """
+    config = config or DatasetConfig()
+    name = loader or config.loader or guess_loader(path)
+    dataset: Dataset = plugins.load(GROUP, name).open(path, config)
+    if config.faults != type(config.faults)():
+        from semslam.datasets.faults import FaultyDataset
+
+        dataset = FaultyDataset(dataset, config.faults)
+    if config.start or config.stride > 1 or config.max_frames is not None:
+        from semslam.datasets.selection import Selection
+
+        dataset = Selection(dataset, config.start, config.max_frames, config.stride)
+    return dataset
+
+
+def guess_loader(path: str | Path) -> str:
+    """The registered name of the loader for a path.
+
+    ``synthetic`` and ``synthetic:...`` mean the rendered scenes unless there is such a path; every other loader
+    is asked in turn whether it recognises the path.
+
+    Raises:
+        DatasetError: there is no such path, or no loader recognises it; the message says what was looked for.
+    """
+    text, place = str(path), Path(path)
+    if not place.exists():
+        if text == SYNTHETIC or text.startswith(f"{SYNTHETIC}:"):
+            return SYNTHETIC
+        raise DatasetError(f"There is no folder or file {place}.")
+    looked_for = []
+    for name in plugins.names(GROUP):
+        if name == SYNTHETIC:
+            continue
+        try:
+            loader: type[DatasetLoader] = plugins.load(GROUP, name)
+        except ConfigError:  # a broken plug-in has been warned of; it must not keep the others from being asked
+            continue
+        if loader.recognises(place):
+            return name
+        looked_for.append(loader.layout)
+    raise DatasetError(f"{place} is no sequence: looked for {'; '.join(looked_for)}.")
