@@ -1,0 +1,45 @@
+"""Reading ahead in the background."""
+
+from collections import deque
+from collections.abc import Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+
+from semslam.datasets.dataset import Dataset
+from semslam.errors import DatasetError
+from semslam.types import Frame
+
+
+def prefetch(dataset: Dataset, ahead: int = 4) -> Iterator[Frame | DatasetError]:
+    """Read frames in order while the caller works on the one before.
+
+    One thread reads, so the dataset need not be safe for several; decoding leaves the interpreter free. The
+    thread ends when the iterator is used up, closed or garbage.
+
+    Args:
+        dataset: the sequence.
+        ahead: frames kept ready at the most.
+
+    Yields:
+        One item per frame, in order: the frame, or the error that stands in its place.
+
+    Raises:
+        Exception: whatever else the dataset raises, at the frame's place.
+    """
+    reader = ThreadPoolExecutor(max_workers=1, thread_name_prefix="semslam-reader")
+    pending: deque[Future[Frame | DatasetError]] = deque()
+    try:
+        for index in range(len(dataset)):
+            pending.append(reader.submit(_read, dataset, index))
+            if len(pending) > ahead:
+                yield pending.popleft().result()
+        while pending:
+            yield pending.popleft().result()
+    finally:
+        reader.shutdown(wait=True, cancel_futures=True)
+
+
+def _read(dataset: Dataset, index: int) -> Frame | DatasetError:
+    try:
+        return dataset.frame(index)
+    except DatasetError as error:
+        return error
