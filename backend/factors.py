@@ -1,0 +1,47 @@
+"""Checked numpy quantities turned into GTSAM's factors and values, and back."""
+
+from collections.abc import Iterable, Mapping
+
+import gtsam
+import numpy as np
+
+from backend.products import Edge
+from semslam.types import FloatArray
+
+ANCHOR_SIGMA = 1e-4
+"""Radians and metres: how firmly the first keyframe is held."""
+FLOATING_SIGMA = 1e3
+"""Radians and metres: how firmly further maps are held; enough to be solvable, too little to pull on a loop."""
+
+
+def prior_factor(key: int, T_world_cam: FloatArray, sigma: float) -> gtsam.PriorFactorPose3:
+    """Hold a keyframe at a pose with an isotropic standard deviation in radians and metres."""
+    return gtsam.PriorFactorPose3(key, gtsam.Pose3(T_world_cam), gtsam.noiseModel.Isotropic.Sigma(6, sigma))
+
+
+def between_factor(edge: Edge, kernel: gtsam.noiseModel.mEstimator.Base | None = None) -> gtsam.BetweenFactorPose3:
+    """A between-factor with the edge's full covariance, inside a robust ``kernel`` where one is given."""
+    noise: gtsam.noiseModel.Base = gtsam.noiseModel.Gaussian.Covariance(edge.covariance)
+    if kernel is not None:
+        noise = gtsam.noiseModel.Robust.Create(kernel, noise)
+    return gtsam.BetweenFactorPose3(edge.from_key, edge.to_key, gtsam.Pose3(edge.T_from_to), noise)
+
+
+def make_values(poses: Mapping[int, FloatArray]) -> gtsam.Values:
+    """GTSAM values of poses (4, 4) by key."""
+    values = gtsam.Values()
+    for key, T_world_cam in poses.items():
+        values.insert(key, gtsam.Pose3(T_world_cam))
+    return values
+
+
+def read_poses(values: gtsam.Values, keys: Iterable[int]) -> dict[int, FloatArray]:
+    """Poses (4, 4) by key out of GTSAM values."""
+    return {key: values.atPose3(key).matrix() for key in keys}
+
+
+def mahalanobis(edge: Edge, poses: Mapping[int, FloatArray]) -> float:
+    """Mahalanobis distance between an edge and the poses it joins, as GTSAM's between-factor measures it."""
+    predicted = gtsam.Pose3(poses[edge.from_key]).between(gtsam.Pose3(poses[edge.to_key]))
+    error = gtsam.Pose3.Logmap(gtsam.Pose3(edge.T_from_to).between(predicted))
+    return float(np.sqrt(error @ np.linalg.solve(edge.covariance, error)))

@@ -1,0 +1,77 @@
+"""What the back end takes and gives back. Covariances are (6, 6), rotation first, as everywhere."""
+
+from dataclasses import dataclass
+
+from semslam.types import FloatArray, LoopConstraint
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Edge:
+    """A measured relative pose between two keyframes.
+
+    Attributes:
+        from_key: keyframe the measurement is expressed in.
+        to_key: keyframe that is measured.
+        T_from_to: (4, 4) pose of ``to_key`` in ``from_key``.
+        covariance: (6, 6) of T_from_to.
+    """
+
+    from_key: int
+    to_key: int
+    T_from_to: FloatArray
+    covariance: FloatArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PosedGraph:
+    """A pose graph with a value for each keyframe: what a g2o file holds.
+
+    Attributes:
+        poses: (4, 4) T_world_cam by key.
+        edges: relative poses, in the order of the file.
+        anchors: keys whose poses are held (g2o's FIX).
+    """
+
+    poses: dict[int, FloatArray]
+    edges: tuple[Edge, ...]
+    anchors: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LoopVerdict:
+    """What the optimised graph says of one loop.
+
+    Attributes:
+        constraint: the loop.
+        weight: how far the graph follows it, 0..1.
+        accepted: whether it is taken for true.
+        residual: Mahalanobis distance between the loop and the optimised poses (6 degrees of freedom).
+    """
+
+    constraint: LoopConstraint
+    weight: float
+    accepted: bool
+    residual: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GraphSolution:
+    """An optimised graph.
+
+    Attributes:
+        poses: (4, 4) T_world_cam by key.
+        verdicts: one per loop, in the order they were added.
+        edges: odometry, then the accepted loops.
+        anchors: the first keyframe of each component, or the one with a prior.
+        cost: half the weighted sum of squared residuals of odometry and loops.
+        components: keys that hang together by odometry and accepted loops; the largest set first.
+        covariances: (6, 6) marginals by key where they were asked for.
+    """
+
+    poses: dict[int, FloatArray]
+    verdicts: tuple[LoopVerdict, ...]
+    edges: tuple[Edge, ...]
+    anchors: tuple[int, ...]
+    cost: float
+    components: tuple[tuple[int, ...], ...]
+    covariances: dict[int, FloatArray] | None = None
