@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass
 from enum import StrEnum
 from typing import Any
 
+from eval.loop_truth import JudgedLoop, LoopJudgement
 from semslam.errors import ResultsError
 from semslam.types import FloatArray, Keyframe, LoopConstraint, LoopEvidence, LoopRejection, NodePair
 
@@ -43,7 +44,7 @@ class LedgerEntry:
         overlap: the smaller two-way overlap, or None.
         T_match_query: rows of the (4, 4) relative pose, or None.
         weight: the back end's weight, 0..1, or None.
-        truth: "true", "inaccurate" or "false", where the loop was accepted and ground truth covers both frames.
+        truth: the judgement and pose error, where the loop was verified and ground truth covers both frames.
     """
 
     query: int
@@ -66,7 +67,7 @@ class LedgerEntry:
     overlap: float | None = None
     T_match_query: list[list[float]] | None = None
     weight: float | None = None
-    truth: str | None = None
+    truth: JudgedLoop | None = None
 
     def to_json(self) -> str:
         """One line of JSON."""
@@ -91,6 +92,10 @@ class LedgerEntry:
                 figures=evidence["figures"],
             )
             values["verdict"] = Verdict(values["verdict"])
+            truth = values["truth"]
+            values["truth"] = truth and JudgedLoop(
+                LoopJudgement(truth["judgement"]), truth["translation_m"], truth["rotation_deg"]
+            )
             return cls(**values)
         except (KeyError, TypeError, ValueError) as error:
             raise ResultsError(f"This is not a line of a loop ledger: {line[:80]!r}.") from error
@@ -116,7 +121,7 @@ def rejected_entry(rejection: LoopRejection, keyframes: Sequence[Keyframe]) -> L
 
 
 def verified_entry(
-    constraint: LoopConstraint, keyframes: Sequence[Keyframe], graph: GraphVerdict, truth: str | None
+    constraint: LoopConstraint, keyframes: Sequence[Keyframe], graph: GraphVerdict, truth: JudgedLoop | None
 ) -> LedgerEntry:
     """The entry of a verified candidate, with the graph's verdict."""
     pose: FloatArray = constraint.T_match_query

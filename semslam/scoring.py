@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from eval.loop_truth import LoopJudgement, judge_loops
+from eval.loop_truth import JudgedLoop, LoopJudgement, judge_loops
 from eval.trajectory import TrajectoryScore, coverage, score_trajectory
 from semslam.config import Config
 from semslam.datasets.dataset import Dataset
 from semslam.errors import TrajectoryError
-from semslam.ledger import GraphVerdict, LedgerEntry, rejected_entry, verified_entry
+from semslam.ledger import GraphVerdict, LedgerEntry, Verdict, rejected_entry, verified_entry
 from semslam.metrics import LoopMetrics, Metrics, TimeMetrics, TrajectoryMetrics
 from semslam.slam import FrameState, SlamResult
 from semslam.types import LoopConstraint, TrackingStatus, Trajectory
@@ -101,37 +101,35 @@ def _score(estimate: Trajectory, truth: Trajectory | None) -> TrajectoryScore | 
 
 
 def _ledger(dataset: Dataset, slam: SlamResult) -> tuple[LedgerEntry, ...]:
-    accepted = [verdict.constraint for verdict in slam.solution.verdicts if verdict.accepted]
-    truths = iter(_truths(dataset, slam, accepted))
-    verdicts = iter(slam.solution.verdicts)
+    verdicts = iter(zip(slam.solution.verdicts, _truths(dataset, slam), strict=True))
     entries = []
     for outcome in slam.outcomes:
-        if not isinstance(outcome, LoopConstraint):
+        if isinstance(outcome, LoopConstraint):
+            verdict, truth = next(verdicts)
+            graph = GraphVerdict(verdict.weight, verdict.accepted)
+            entries.append(verified_entry(outcome, slam.keyframes, graph, truth))
+        else:
             entries.append(rejected_entry(outcome, slam.keyframes))
-            continue
-        verdict = next(verdicts)
-        truth = next(truths) if verdict.accepted else None
-        graph = GraphVerdict(verdict.weight, verdict.accepted)
-        entries.append(verified_entry(outcome, slam.keyframes, graph, truth))
     return tuple(entries)
 
 
-def _truths(dataset: Dataset, slam: SlamResult, loops: Sequence[LoopConstraint]) -> Sequence[LoopJudgement | None]:
+def _truths(dataset: Dataset, slam: SlamResult) -> Sequence[JudgedLoop | None]:
+    """Each verified loop against ground truth."""
+    loops = [verdict.constraint for verdict in slam.solution.verdicts]
     if dataset.ground_truth is None:
         return [None] * len(loops)
-    keyframes = {keyframe.id: keyframe for keyframe in slam.keyframes}
-    return judge_loops(loops, keyframes, dataset.ground_truth, lambda index: dataset.frame(index).depth)
+    return judge_loops(loops, slam.keyframes, dataset.ground_truth, lambda index: dataset.frame(index).depth)
 
 
 def _loop_metrics(slam: SlamResult, ledger: Sequence[LedgerEntry], truth_is_known: bool) -> LoopMetrics:
-    kinds = Counter(entry.truth for entry in ledger if entry.truth is not None)
-    accepted = sum(verdict.accepted for verdict in slam.solution.verdicts)
-    known = truth_is_known and (accepted == 0 or bool(kinds))
+    accepted = [entry for entry in ledger if entry.verdict is Verdict.ACCEPTED]
+    kinds = Counter(entry.truth.judgement for entry in accepted if entry.truth is not None)
+    known = truth_is_known and (not accepted or bool(kinds))
     return LoopMetrics(
         proposed=len(slam.outcomes),
         verified=len(slam.solution.verdicts),
-        accepted=accepted,
-        true=kinds["true"] if known else None,
-        inaccurate=kinds["inaccurate"] if known else None,
-        false=kinds["false"] if known else None,
+        accepted=len(accepted),
+        true=kinds[LoopJudgement.TRUE] if known else None,
+        inaccurate=kinds[LoopJudgement.INACCURATE] if known else None,
+        false=kinds[LoopJudgement.FALSE] if known else None,
     )

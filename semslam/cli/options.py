@@ -1,11 +1,12 @@
 """Options that several commands share."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from semslam.config import Config, load_config, parse_overrides
+if TYPE_CHECKING:
+    from semslam.config import Config
 
 Sequence = Annotated[str, typer.Argument(help="A sequence: a folder (TUM, 7-Scenes, generic), a .bag or synthetic:...")]
 Odometry = Annotated[str | None, typer.Option("--odometry", help="Registered odometry.")]
@@ -30,8 +31,10 @@ def settings(
     start: int = 0,
     max_frames: int | None = None,
     stride: int = 1,
-) -> Config:
+) -> "Config":
     """Join the settings file, ``--set`` texts and the named options, the later winning."""
+    from semslam.config import load_config, parse_overrides
+
     loaded = load_config(config, parse_overrides(overrides or []))
     named = {"odometry": odometry, "detector": detector, "seed": seed}
     frames = {

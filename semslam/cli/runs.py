@@ -9,10 +9,10 @@ import typer
 from semslam.cli import options
 from semslam.cli.command import Command, example
 from semslam.cli.console import bar, frame_progress, metrics_table, out, remark, remarks
-from semslam.config import Config
 from semslam.errors import ConfigError, ResultsError
 
 if TYPE_CHECKING:
+    from semslam.config import Config
     from semslam.datasets.dataset import Dataset
     from semslam.metrics import Metrics
 
@@ -43,7 +43,7 @@ def run_command(
     from semslam.results import link_latest, new_run_directory
 
     chosen = options.settings(config, overrides, odometry, detector, seed, loader, start, max_frames, stride)
-    dataset = open_dataset(sequence, chosen.dataset)
+    dataset = open_dataset(sequence, config=chosen.dataset)
     directory = out_directory or new_run_directory(RUNS, dataset.name, chosen.detector)
     metrics = _run_one(dataset, chosen, directory, plots)
     if out_directory is None:
@@ -73,7 +73,7 @@ def compare_command(
     from semslam.results import link_latest, new_run_directory
 
     chosen = options.settings(config, overrides, odometry, None, seed, loader, start, max_frames, stride)
-    dataset = open_dataset(sequence, chosen.dataset)
+    dataset = open_dataset(sequence, config=chosen.dataset)
     directory = out_directory or new_run_directory(RUNS, dataset.name, "compare")
     _compare(dataset, chosen, _names(detectors), directory, plots)
     if out_directory is None:
@@ -88,7 +88,7 @@ def demo_command(
     from semslam.datasets import open_dataset
 
     chosen = options.settings(None, None, seed=seed)
-    dataset = open_dataset(DEMO_SEQUENCE, chosen.dataset)
+    dataset = open_dataset(DEMO_SEQUENCE, config=chosen.dataset)
     alone, closed = _compare(dataset, chosen, _names(DEMO_DETECTORS), out_directory, plots=True)
     before, after = alone.optimized.ate_rmse_m, closed.optimized.ate_rmse_m
     if before is not None and after is not None:
@@ -110,7 +110,7 @@ def _names(text: str) -> list[str]:
 
 
 def _compare(
-    dataset: "Dataset", config: Config, detectors: Sequence[str], directory: Path, plots: bool
+    dataset: "Dataset", config: "Config", detectors: Sequence[str], directory: Path, plots: bool
 ) -> list["Metrics"]:
     from semslam.results import write_json
 
@@ -127,7 +127,7 @@ def _compare(
     return runs
 
 
-def _run_one(dataset: "Dataset", config: Config, directory: Path, plots: bool) -> "Metrics":
+def _run_one(dataset: "Dataset", config: "Config", directory: Path, plots: bool) -> "Metrics":
     from semslam.pipeline import run
     from semslam.results import check_writable, write_run
 
