@@ -1,0 +1,124 @@
+"""Microsoft 7-Scenes in its own layout."""
+
+from pathlib import Path
+from typing import ClassVar, Self
+
+import numpy as np
+
+from semslam.camera import Intrinsics
+from semslam.config import DatasetConfig
+from semslam.datasets.camera_file import CameraSetup
+from semslam.datasets.cameras import find_camera
+from semslam.datasets.image_sequence import ImagePair, ImageSequence
+from semslam.datasets.images import read_depth
+from semslam.datasets.registration import register_depth
+from semslam.errors import DatasetError
+from semslam.geometry import FloatArray, invert, is_rigid, make_transform, orthonormalise
+from semslam.types import Float32Array, Trajectory
+
+COLOR_CAMERA = Intrinsics(640, 480, 525.0, 525.0, 320.0, 240.0)
+DEPTH_CAMERA = Intrinsics(640, 480, 585.0, 585.0, 320.0, 240.0)
+MILLIMETRES = 1000.0
+NO_DEPTH = 65535
+RIGID_TOLERANCE = 0.01
+
+T_COLOR_DEPTH = make_transform(
+    [
+        [9.9996518012567637e-01, 2.6765126468950343e-03, -7.9041012313000904e-03],
+        [-2.7409311281316700e-03, 9.9996302803027592e-01, -8.1504520778013286e-03],
+        [7.8819942130445332e-03, 8.1718328771890631e-03, 9.9993554558014031e-01],
+    ],
+    [-2.5558943178152542e-02, 1.0109636268061706e-04, 2.0318321729487039e-03],
+)
+"""Depth camera to colour camera. The data set has no calibration of its own; this is a Kinect of the same kind
+(https://projet.liris.cnrs.fr/voir/activities-dataset/kinect-calibration.html), as the relocalisation benchmarks
+use it with focal lengths of 585 (depth, the data set's page) and 525 (colour)."""
+
+
+class SevenScenesDataset(ImageSequence):
+    """A folder seq-XX with frame-000000.color.png, .depth.png and .pose.txt; or a scene with one such folder.
+
+    Depth is in millimetres, 65535 (and 0) = none. It is not registered to colour in the raw data: by default it is
+    warped into the colour camera, and the poses, which are the depth camera's, are moved to the colour camera.
+    With ``register_depth`` off (for copies whose depth is registered already) both are taken as they are.
+    Frame i has the stamp of its number / ``fps``.
+    """
+
+    layout: ClassVar[str] = "frame-000000.color.png or seq-01/ (7-Scenes)"
+    _register = False
+
+    @classmethod
+    def recognises(cls, path: Path) -> bool:
+        """Whether frames, or folders seq-XX, lie in the folder."""
+        return any(path.glob("frame-*.color.png")) or any(path.glob("seq-*/frame-*.color.png"))
+
+    @classmethod
+    def open(cls, path: str | Path, config: DatasetConfig) -> Self:
+        """List the frames and read the poses of a sequence.
+
+        Raises:
+            DatasetError: there are no frames, or the path is a scene with several sequences.
+        """
+        folder = _sequence_folder(Path(path))
+        notes: list[str] = []
+        setup = find_camera(folder, config) or CameraSetup(COLOR_CAMERA, config.depth_scale)
+        color = sorted(folder.glob("frame-*.color.png"))
+        numbers = [_number(file) for file in color]
+        stamps = [number / config.fps for number in numbers]
+        depth = [file.with_name(file.name.replace(".color.", ".depth.")) for file in color]
+        pairs = [ImagePair(*row) for row in zip(stamps, color, depth, strict=True)]
+        truth = _read_poses(stamps, color, config.register_depth, notes)
+        name = f"{folder.resolve().parent.name}-{folder.resolve().name}"
+        dataset = cls(name, setup.intrinsics, setup.depth_scale or MILLIMETRES, pairs, truth, notes)
+        dataset._register = config.register_depth
+        return dataset
+
+    def _read_depth(self, path: Path) -> Float32Array:
+        size = (self.intrinsics.width, self.intrinsics.height)
+        if not self._register:
+            return read_depth(path, self._depth_scale, size, missing=NO_DEPTH)
+        raw = read_depth(path, self._depth_scale, (DEPTH_CAMERA.width, DEPTH_CAMERA.height), missing=NO_DEPTH)
+        return register_depth(raw, DEPTH_CAMERA, T_COLOR_DEPTH, self.intrinsics)
+
+
+def _sequence_folder(path: Path) -> Path:
+    if any(path.glob("frame-*.color.png")):
+        return path
+    sequences = sorted({file.parent for file in path.glob("seq-*/frame-000000.color.png")})
+    if len(sequences) == 1:
+        return sequences[0]
+    if sequences:
+        names = ", ".join(folder.name for folder in sequences)
+        raise DatasetError(f"{path} is a scene with several sequences; name one of {names}.")
+    raise DatasetError(f"{path} holds no frame-000000.color.png.")
+
+
+def _number(file: Path) -> int:
+    text = file.name.removeprefix("frame-").removesuffix(".color.png")
+    if not text.isdigit():
+        raise DatasetError(f"The name of {file} has no frame number.")
+    return int(text)
+
+
+def _read_poses(stamps: list[float], color: list[Path], register: bool, notes: list[str]) -> Trajectory | None:
+    """Poses of the colour camera; a file that is missing or damaged is counted, not fatal."""
+    poses, times = [], []
+    for stamp, file in zip(stamps, color, strict=True):
+        pose = _read_pose(file.with_name(file.name.replace(".color.png", ".pose.txt")))
+        if pose is not None:
+            poses.append(pose)
+            times.append(stamp)
+    if left := len(color) - len(poses):
+        notes.append(f"{left} of {len(color)} frames have no usable pose file.")
+    if not poses:
+        return None
+    T_world_cam = orthonormalise(np.stack(poses))
+    return Trajectory(np.array(times), T_world_cam @ invert(T_COLOR_DEPTH) if register else T_world_cam)
+
+
+def _read_pose(file: Path) -> FloatArray | None:
+    try:
+        pose = np.array(file.read_text(encoding="utf-8").split(), dtype=np.float64).reshape(4, 4)
+    except (OSError, ValueError):
+        return None
+    return pose if is_rigid(pose, RIGID_TOLERANCE) else None
