@@ -1,0 +1,115 @@
+"""Faults put into a sequence on purpose, to see what becomes of the stages behind.
+
+What each fault does to the sequence, and what has to come of it:
+
+| fault | in the sequence | expected outcome |
+|---|---|---|
+| drop | a share of the frames is missing, at random | larger motions; tracking goes on |
+| gaps | no frame for an interval | tracking goes on, or is lost and found again; a new map at worst |
+| unreadable | a share of the frames raises DatasetError | the frame is counted, noted and skipped |
+| black | colour is all zero, depth is not | the frames are lost or degraded, never a silent identity |
+| blur | colour is smeared along u | the frames may be degraded |
+| frozen | the image before the interval is repeated | no motion is reported; none is invented afterwards |
+| no_depth | depth is all zero | the frames are lost or degraded; nothing divides by zero |
+| nan_depth | half of the depth values are NaN | as if those pixels had none: no NaN leaves the front end |
+"""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import cv2
+import numpy as np
+
+from semslam.config import FaultConfig, Interval
+from semslam.datasets.dataset import Dataset
+from semslam.errors import DatasetError
+from semslam.types import Frame, Intrinsics, Trajectory
+
+BLUR_PIXELS = 25
+
+
+class FaultyDataset:
+    """A dataset with faults; the same settings give the same faults, whatever the order of reading.
+
+    Args:
+        dataset: the sound sequence.
+        config: which faults, and when.
+
+    Raises:
+        DatasetError: no frame is left.
+    """
+
+    def __init__(self, dataset: Dataset, config: FaultConfig) -> None:
+        self._dataset, self._config = dataset, config
+        times = np.array(dataset.timestamps)
+        self._elapsed = times - times[0]
+        drawn = np.random.default_rng(config.seed).random((2, len(times)))
+        gone = drawn[0] < config.drop
+        for begin, end in config.gaps:
+            gone |= (self._elapsed >= begin) & (self._elapsed < end)
+        self._kept = np.flatnonzero(~gone).tolist()
+        self._unreadable = drawn[1] < config.unreadable
+        if not self._kept:
+            raise DatasetError(f"The faults leave no frame of {dataset.name}.")
+        self.timestamps = times[self._kept].tolist()
+        self.notes = [*dataset.notes, f"Faults were put in on purpose: {self._describe()}."]
+
+    @property
+    def name(self) -> str:
+        """Name of the sound sequence."""
+        return self._dataset.name
+
+    @property
+    def intrinsics(self) -> Intrinsics:
+        """The camera."""
+        return self._dataset.intrinsics
+
+    @property
+    def ground_truth(self) -> Trajectory | None:
+        """Ground truth of the sound sequence."""
+        return self._dataset.ground_truth
+
+    def __len__(self) -> int:
+        return len(self._kept)
+
+    def frame(self, index: int) -> Frame:
+        """Read a frame and damage it as its time demands.
+
+        Raises:
+            DatasetError: the image is not readable, or was made so.
+            IndexError: there is no such frame.
+        """
+        if not 0 <= index < len(self):
+            raise IndexError(f"Frame {index} of {len(self)}.")
+        source = self._kept[index]
+        if self._unreadable[source]:
+            raise DatasetError(f"Frame {source} of {self.name} was made unreadable on purpose.")
+        frame = self._dataset.frame(self._source_of_image(source))
+        color, depth = frame.color, frame.depth
+        if self._hits(self._config.black, source):
+            color = np.zeros_like(color)
+        if self._hits(self._config.blur, source):
+            color = np.asarray(cv2.blur(color, (BLUR_PIXELS, 1)), dtype=np.uint8)
+        if self._hits(self._config.no_depth, source):
+            depth = np.zeros_like(depth)
+        if self._hits(self._config.nan_depth, source):
+            lost = np.random.default_rng((self._config.seed, source)).random(depth.shape) < 0.5
+            depth = np.where(lost, np.float32(np.nan), depth)
+        return replace(frame, index=index, timestamp=self.timestamps[index], color=color, depth=depth)
+
+    def __iter__(self) -> Iterator[Frame]:
+        return (self.frame(index) for index in range(len(self)))
+
+    def _hits(self, intervals: tuple[Interval, ...], source: int) -> bool:
+        return any(begin <= self._elapsed[source] < end for begin, end in intervals)
+
+    def _source_of_image(self, source: int) -> int:
+        """The frame whose image is shown: within a frozen interval, the last one before it."""
+        for begin, end in self._config.frozen:
+            if begin <= self._elapsed[source] < end:
+                return max(0, int(np.searchsorted(self._elapsed, begin)) - 1)
+        return source
+
+    def _describe(self) -> str:
+        chosen = self._config.model_dump(exclude_defaults=True)
+        return ", ".join(f"{name}={value}" for name, value in chosen.items())
