@@ -17,13 +17,13 @@ GROUP = "semslam.datasets"
 SYNTHETIC = "synthetic"
 
 
-def open_dataset(path: str | Path, loader: str | None = None, config: DatasetConfig | None = None) -> Dataset:
+def open_dataset(path: str | Path, config: DatasetConfig | None = None, *, loader: str | None = None) -> Dataset:
     """Open a sequence; no image is read yet.
 
     Args:
         path: a folder, a ROS bag, or ``synthetic:SCENE?key=value``.
-        loader: registered name of its kind; None = as the settings say, or else guessed from the path.
         config: which frames are read, and how.
+        loader: registered name of its kind; None = as the settings say, or else guessed from the path.
 
     Returns:
         The sequence with start, stride, max_frames and faults of the settings applied.
