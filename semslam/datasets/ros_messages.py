@@ -1,0 +1,85 @@
+"""Images and cameras out of ROS messages, as the package rosbags deserialises them."""
+
+from typing import Any
+
+import cv2
+import numpy as np
+
+from semslam.camera import NO_DISTORTION, Intrinsics
+from semslam.errors import ConfigError, DatasetError
+from semslam.types import Float32Array, UInt8Array
+
+_TO_RGB = {
+    "rgb8": (3, None),
+    "bgr8": (3, cv2.COLOR_BGR2RGB),
+    "rgba8": (4, cv2.COLOR_RGBA2RGB),
+    "bgra8": (4, cv2.COLOR_BGRA2RGB),
+    "mono8": (1, cv2.COLOR_GRAY2RGB),
+    "8UC3": (3, cv2.COLOR_BGR2RGB),
+}
+
+
+def to_intrinsics(info: Any, topic: str) -> Intrinsics:
+    """The camera of a sensor_msgs CameraInfo of ROS 1 or ROS 2; a distortion model other than Brown's counts as none.
+
+    Raises:
+        DatasetError: its figures are not usable.
+    """
+    K = info.K if hasattr(info, "K") else info.k
+    coefficients = list(info.D if hasattr(info, "D") else info.d)
+    k1, k2, p1, p2, k3 = (coefficients + [0.0] * 5)[:5] if len(coefficients) in (4, 5) else NO_DISTORTION
+    distortion = (float(k1), float(k2), float(p1), float(p2), float(k3))
+    try:
+        return Intrinsics(info.width, info.height, float(K[0]), float(K[4]), float(K[2]), float(K[5]), distortion)
+    except ConfigError as error:
+        raise DatasetError(f"The CameraInfo of {topic} is not usable: {error}") from error
+
+
+def _pixels(message: Any, dtype: np.dtype[Any], channels: int) -> Any:
+    """The image (H, W, channels) of a raw message, whose rows may be padded."""
+    row = message.width * channels * dtype.itemsize
+    data = np.frombuffer(message.data, np.uint8)
+    if message.step < row or data.size < message.step * message.height:
+        raise DatasetError(f"An image message of {message.width}x{message.height} pixels is cut off.")
+    rows = data[: message.step * message.height].reshape(message.height, message.step)[:, :row]
+    typed = np.ascontiguousarray(rows).view(dtype.newbyteorder(">" if message.is_bigendian else "<"))
+    return typed.reshape(message.height, message.width, channels)
+
+
+def to_color(message: Any, topic: str) -> UInt8Array:
+    """A sensor_msgs Image or CompressedImage as (H, W, 3) uint8 RGB.
+
+    Raises:
+        DatasetError: the encoding is not known, or the message is damaged.
+    """
+    if not hasattr(message, "encoding"):
+        bgr = cv2.imdecode(np.frombuffer(message.data, np.uint8), cv2.IMREAD_COLOR)
+        if bgr is None:
+            raise DatasetError(f"A compressed image of {topic} is damaged.")
+        return np.asarray(cv2.cvtColor(bgr, cv2.COLOR_BGR2RGB), dtype=np.uint8)
+    if message.encoding not in _TO_RGB:
+        raise DatasetError(f"The images of {topic} are in the encoding '{message.encoding}', which is not known.")
+    channels, conversion = _TO_RGB[message.encoding]
+    image = _pixels(message, np.dtype(np.uint8), channels)
+    return np.asarray(image.copy() if conversion is None else cv2.cvtColor(image, conversion), dtype=np.uint8)
+
+
+def to_depth(message: Any, topic: str, scale: float) -> Float32Array:
+    """A sensor_msgs Image as depth (H, W) float32 metres, 0 where there is none.
+
+    Args:
+        message: 32FC1 in metres, or 16UC1 in units.
+        topic: for the error message.
+        scale: units per metre of 16UC1.
+
+    Raises:
+        DatasetError: the encoding is another one, or the message is cut off.
+    """
+    if message.encoding in ("16UC1", "mono16"):
+        depth = _pixels(message, np.dtype(np.uint16), 1)[..., 0].astype(np.float32) / np.float32(scale)
+    elif message.encoding == "32FC1":
+        depth = _pixels(message, np.dtype(np.float32), 1)[..., 0].astype(np.float32)
+    else:
+        raise DatasetError(f"The depth images of {topic} are in the encoding '{message.encoding}', not 16UC1 or 32FC1.")
+    depth[~(np.isfinite(depth) & (depth > 0))] = 0.0
+    return np.asarray(depth, dtype=np.float32)
