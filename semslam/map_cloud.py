@@ -30,5 +30,5 @@ def write_map(path: Path, slam: SlamResult) -> None:
         cloud.points = o3d.utility.Vector3dVector(np.concatenate(points))
         cloud.normals = o3d.utility.Vector3dVector(np.concatenate(normals))
         cloud = cloud.voxel_down_sample(VOXEL)
-    if not o3d.io.write_point_cloud(str(path), cloud) and kept:
+    if not o3d.io.write_point_cloud(path, cloud) and kept:
         raise ResultsError(f"The map {path} cannot be written.")

@@ -23,7 +23,7 @@ from semslam.ledger import LedgerEntry
 from semslam.map_cloud import write_map
 from semslam.metrics import Metrics
 from semslam.pipeline import RunResult
-from semslam.presentation import write_plots, write_report
+from semslam.presentation import write_plots
 from semslam.types import Trajectory
 
 
@@ -80,11 +80,11 @@ def write_run(result: RunResult, dataset: Dataset, directory: Path, plots: bool 
         write_trajectory(work / "trajectory.txt", result.trajectory)
         write_trajectory(work / "keyframes.txt", _keyframe_trajectory(result))
         write_ledger(work / "loops.jsonl", result.ledger)
-        write_g2o(work / "graph.g2o", result.slam.graph)
+        write_g2o(work / "graph.g2o", result.slam.solution)
         write_map(work / "map.ply", result.slam)
         if plots:
             write_plots(result, work / "plots")
-            write_report(result, dataset, work)
+            pass
 
 
 def check_writable(directory: Path) -> None:

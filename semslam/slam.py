@@ -5,7 +5,7 @@ from typing import Self
 
 import numpy as np
 
-from backend.pose_graph import GraphSolution, PosedGraph, PoseGraph
+from backend.pose_graph import GraphSolution, PoseGraph
 from frontend.keyframes import KeyframePolicy, make_keyframe
 from frontend.odometry import Odometry
 from loop.detector import LoopDetector
@@ -62,7 +62,6 @@ class SlamResult:
         candidates: what the detector proposed, in order.
         outcomes: what the verification made of each candidate.
         solution: optimised keyframe poses and a verdict for each verified loop.
-        graph: the optimised poses with odometry and the accepted loops.
         poses: (N, 4, 4) optimised T_world_cam of every frame.
         components: for each frame the map it ends in, 0 the largest; maps that a loop joined share a number.
     """
@@ -71,7 +70,6 @@ class SlamResult:
     keyframes: tuple[Keyframe, ...]
     outcomes: tuple[LoopConstraint | LoopRejection, ...]
     solution: GraphSolution
-    graph: PosedGraph
     poses: FloatArray
     components: tuple[int, ...]
 
@@ -201,7 +199,6 @@ class Slam:
             keyframes=tuple(self._keyframes),
             outcomes=tuple(self._outcomes),
             solution=solution,
-            graph=self._graph.snapshot(solution),
             poses=recover_poses(
                 np.array([state.timestamp for state in self._frames]),
                 np.array([state.T_odom_cam for state in self._frames]).reshape(-1, 4, 4),

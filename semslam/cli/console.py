@@ -10,7 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 if TYPE_CHECKING:
-    from semslam.metrics import Metrics
+    from semslam.metrics import LoopMetrics, Metrics
     from semslam.slam import FrameState
 
 out = Console()
@@ -50,33 +50,37 @@ def frame_progress(update: Callable[[int], None]) -> Callable[[int, "FrameState 
 
 
 def metrics_table(runs: Sequence["Metrics"], title: str) -> Table:
-    """A row per run, odometry alone and optimised side by side."""
-    table = Table(title=title, title_justify="left")
+    """A column per run, a row per figure."""
+    table = Table(title=title, title_justify="left", caption_justify="left")
     table.add_column("detector")
-    table.add_column("odometry")
-    for heading in ("tracked", "truth", "ATE odom. cm", "ATE final cm", "Sim(3) cm", "RPE cm/s", "RPE °/s"):
-        table.add_column(heading, justify="right")
-    for heading in ("loops", "true/inacc./false", "fps"):
-        table.add_column(heading, justify="right")
     for run in runs:
-        loops = run.loops
-        kinds = "-" if loops.true is None else f"{loops.true}/{loops.inaccurate}/{loops.false}"
-        table.add_row(
-            run.detector,
-            run.odometry,
-            f"{100 * run.tracked / max(run.frames, 1):.0f} %" + ("" if run.maps == 1 else f" ({run.maps} maps)"),
-            _percent(run.ground_truth_coverage),
-            _centimetres(run.odometry_only.ate_rmse_m),
-            _centimetres(run.optimized.ate_rmse_m),
-            _centimetres(run.optimized.ate_sim3_rmse_m),
-            _centimetres(run.optimized.rpe_trans_1s_m),
-            "-" if run.optimized.rpe_rot_1s_deg is None else f"{run.optimized.rpe_rot_1s_deg:.2f}",
-            f"{loops.accepted}/{loops.verified}/{loops.proposed}",
-            kinds,
-            f"{run.time.fps:.1f}",
-        )
-    table.caption = "loops: accepted/verified/proposed; truth: share of frames with ground truth"
+        table.add_column(run.detector, justify="right")
+    rows: tuple[tuple[str, Callable[[Metrics], str]], ...] = (
+        ("odometry", lambda run: run.odometry),
+        ("ATE of the odometry alone, cm", lambda run: _centimetres(run.odometry_only.ate_rmse_m)),
+        ("ATE, cm", lambda run: _centimetres(run.optimized.ate_rmse_m)),
+        ("ATE after Sim(3), cm", lambda run: _centimetres(run.optimized.ate_sim3_rmse_m)),
+        ("largest error, cm", lambda run: _centimetres(run.optimized.ate_max_m)),
+        ("RPE over 1 s, cm", lambda run: _centimetres(run.optimized.rpe_trans_1s_m)),
+        ("RPE over 1 s, degrees", lambda run: _figure(run.optimized.rpe_rot_1s_deg)),
+        ("tracked", lambda run: _percent(run.tracked / max(run.frames, 1))),
+        ("with ground truth", lambda run: _percent(run.ground_truth_coverage)),
+        ("maps", lambda run: str(run.maps)),
+        ("loops proposed / verified / accepted", lambda run: _counts(run.loops, "proposed", "verified", "accepted")),
+        ("accepted true / inaccurate / false", lambda run: _counts(run.loops, "true", "inaccurate", "false")),
+        ("frames per second", lambda run: _figure(run.time.fps)),
+    )
+    for heading, text in rows:
+        table.add_row(heading, *map(text, runs))
     return table
+
+
+def _counts(loops: "LoopMetrics", *names: str) -> str:
+    return " / ".join("-" if getattr(loops, name) is None else str(getattr(loops, name)) for name in names)
+
+
+def _figure(value: float | None) -> str:
+    return "-" if value is None else f"{value:.2f}"
 
 
 def _centimetres(metres: float | None) -> str:
