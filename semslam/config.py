@@ -78,7 +78,7 @@ class FeatureOdometryConfig(Section):
 
     min_inliers: int = Field(15, gt=5, description="matches that must agree on a motion")
     threshold_px: float = Field(3.0, gt=0, description="reprojection error up to which a match agrees")
-    covariance_scale: float = Field(1.0, gt=0, description="factor that calibrates the covariance")
+    covariance_scale: float = Field(10.0, gt=0, description="factor that calibrates the covariance")
 
 
 class DenseConfig(Section):
@@ -89,21 +89,21 @@ class DenseConfig(Section):
     min_coverage: float = Field(0.05, gt=0, le=1, description="share of pixels that must have depth")
     min_contrast: float = Field(4.0, ge=0, description="standard deviation of grey values that an image must have")
     min_fitness: float = Field(0.3, gt=0, le=1, description="share of pixels that must agree on a motion")
-    sigma: float = Field(0.3, gt=0, description="metres; error of one pixel's depth that calibrates the covariance")
+    sigma: float = Field(0.6, gt=0, description="metres; error of one pixel's depth that calibrates the covariance")
 
 
 class KissConfig(Section):
     """KISS-ICP with a preset for depth cameras."""
 
     max_range: float = Field(4.0, gt=0, description="metres; farther points are not used")
-    voxel: float = Field(0.04, gt=0, description="metres; voxel size of the local map")
+    voxel: float = Field(0.05, gt=0, description="metres; voxel size of the local map")
     initial_threshold: float = Field(0.1, gt=0, description="metres; first association threshold")
     min_motion: float = Field(0.01, gt=0, description="metres; smaller deviations do not adapt the threshold")
     stride: int = Field(4, gt=0, description="every n-th pixel in both directions is used")
     min_points: int = Field(500, gt=10, description="points that a scan must have")
     max_surprise: float = Field(0.3, gt=0, description="metres between prediction and result that mean failure")
     max_surprise_rotation: float = Field(0.5, gt=0, description="radians, the same")
-    sigma: float = Field(0.3, gt=0, description="metres; error of one point that calibrates the covariance")
+    sigma: float = Field(0.15, gt=0, description="metres; error of one point that calibrates the covariance")
 
 
 class SegmentationConfig(Section):
@@ -114,6 +114,8 @@ class SegmentationConfig(Section):
     width: int = Field(320, gt=0, description="input width in pixels")
     height: int = Field(240, gt=0, description="input height in pixels")
     threads: int = Field(1, gt=0, description="inference threads")
+    precision: Literal["int8", "float32"] = Field("int8", description="arithmetic of the shipped network")
+    min_confidence: float = Field(0.0, ge=0, lt=1, description="below it a pixel becomes void; 0 = never")
     labels_dir: Path | None = Field(None, description="folder of label images for the segmenter 'folder'")
     cache_dir: Path | None = Field(None, description="where segmentations are cached by content; none = no cache")
 
@@ -226,7 +228,23 @@ class PaperSemanticConfig(SemanticConfig):
 class VerificationConfig(Section):
     """Gates between a candidate and a constraint."""
 
-    min_inliers: int = Field(20, gt=3, description="feature matches that must agree on the pose")
+    min_inliers: int = Field(20, gt=5, description="feature matches that must agree on the pose")
+    match_ratio: float = Field(0.9, gt=0, le=1, description="a match's distance over that of the second best, at most")
+    max_reprojection: float = Field(3.0, gt=0, description="pixels within which a match agrees with a pose")
+    min_points: int = Field(100, gt=5, description="points that both clouds must have")
+    icp_distances: tuple[float, ...] = Field((0.1, 0.05), description="metres, correspondence limit of each ICP pass")
+    max_shift: float = Field(20.0, gt=0, description="pixels, median, by which ICP may move the agreeing matches")
+    fit_distance: float = Field(0.05, gt=0, description="metres within which a point meets the other surface")
+    min_fitness: float = Field(0.2, ge=0, le=1, description="share of the query's points that meet the match's surface")
+    max_rmse: float = Field(0.035, gt=0, description="metres, over those points")
+    overlap_distance: float = Field(0.1, gt=0, description="metres within which a point counts as seen by the other")
+    min_overlap: float = Field(0.2, ge=0, le=1, description="share of either view that the other must see")
+    max_free_space: float = Field(0.1, ge=0, le=1, description="share of points that may stand in seen-through space")
+    max_sigma: float = Field(0.25, gt=0, description="metres, standard deviation of the position at the most")
+    icp_inflation: float = Field(100.0, gt=0, description="factor on ICP's formal variance: points err together")
+    pnp_inflation: float = Field(10.0, gt=0, description="factor on PnP's formal variance")
+    sigma_rotation: float = Field(0.015, ge=0, description="radians, error that no formal variance knows of")
+    sigma_translation: float = Field(0.02, ge=0, description="metres, the same")
 
 
 class BackendConfig(Section):
@@ -333,4 +351,6 @@ def _validated(model: type[ConfigT], values: Mapping[str, Any]) -> ConfigT:
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"]) or "settings"
-        raise ConfigError(f"Setting '{where}': {first['msg']}.") from error
+        if first["type"] == "extra_forbidden":
+            raise ConfigError(f"There is no setting '{where}' (see 'semslam config' for all of them).") from error
+        raise ConfigError(f"Setting '{where}': {first['msg'].lower()}, not {first['input']!r}.") from error

@@ -1,0 +1,66 @@
+"""Odometry from ORB matches and PnP, frame to frame."""
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+
+from frontend.reference import ReferenceTracker, Registration
+from semslam.config import Config
+from semslam.features import FeatureExtractor, match_descriptors, solve_pnp
+from semslam.types import Features, FloatArray, Frame, Intrinsics, Motion
+
+
+class FeatureOdometry:
+    """Matches ORB features with the previous frame's and solves PnP among wrong matches. Drifts: it has no map."""
+
+    def __init__(self, config: Config) -> None:
+        self._tracker = ReferenceTracker(_FeatureRegistrar(config))
+
+    @classmethod
+    def from_config(cls, config: Config) -> Self:
+        """Build it from the settings."""
+        return cls(config)
+
+    def track(self, frame: Frame) -> Motion:
+        """Motion since the previous frame; LOST where too few matches agree on one.
+
+        Raises:
+            DatasetError: the frame's size does not fit its intrinsics.
+        """
+        return self._tracker.track(frame)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _View:
+    features: Features
+    intrinsics: Intrinsics
+
+
+class _FeatureRegistrar:
+    def __init__(self, config: Config) -> None:
+        self._config = config.feature
+        self._seed = config.seed
+        self._extractor = FeatureExtractor(config.features)
+
+    def prepare(self, frame: Frame) -> _View | None:
+        features = self._extractor.extract(frame)
+        if np.count_nonzero(features.depths) < self._config.min_inliers:
+            return None
+        return _View(features, frame.intrinsics)
+
+    def register(self, reference: _View, current: _View, T_ref_cam: FloatArray) -> Registration | None:
+        matches = match_descriptors(reference.features.descriptors, current.features.descriptors)
+        matches = matches[reference.features.depths[matches[:, 0]] > 0]
+        found = solve_pnp(
+            reference.features.points[matches[:, 0]],
+            current.features.pixels[matches[:, 1]],
+            current.intrinsics,
+            threshold_px=self._config.threshold_px,
+            seed=self._seed,
+        )
+        inliers = 0 if found is None else int(found.inliers.sum())
+        if found is None or inliers < self._config.min_inliers:
+            return None
+        covariance = found.covariance * self._config.covariance_scale
+        return Registration(found.T_ref_cam, covariance, inliers, inliers < 2 * self._config.min_inliers)

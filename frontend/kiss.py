@@ -1,0 +1,101 @@
+"""Geometric odometry: KISS-ICP (Vizzo et al., RA-L 2023) on the back-projected depth image."""
+
+from typing import Any, Self
+
+import numpy as np
+
+from frontend.prediction import ConstantVelocity, check_frame, first_motion
+from semslam.config import Config, KissConfig
+from semslam.geometry import invert, is_rigid, rotation_angle
+from semslam.types import FloatArray, Frame, Motion, TrackingStatus
+
+
+class KissOdometry:
+    """Point-to-point ICP against a local voxel map, with a preset for depth cameras. Blind to colour."""
+
+    def __init__(self, config: Config) -> None:
+        self._config = config.kiss
+        self._icp = _make_icp(config.kiss)
+        self._prediction = ConstantVelocity()
+        self._started = False
+        self._lost_since: float | None = None
+        self._map_id = 0
+
+    @classmethod
+    def from_config(cls, config: Config) -> Self:
+        """Build it from the settings."""
+        return cls(config)
+
+    def track(self, frame: Frame) -> Motion:
+        """Motion since the previous frame; LOST where there is too little depth or the map does not meet it.
+
+        Raises:
+            DatasetError: the frame's size does not fit its intrinsics.
+        """
+        check_frame(frame)
+        points = frame.intrinsics.back_project(frame.depth, step=self._config.stride).astype(np.float64)
+        points = points[points[:, 2] <= self._config.max_range]
+        T_prev_cur = self._prediction.predict(frame.timestamp)
+        self._icp.last_delta = T_prev_cur
+        T_odom_prev = self._icp.last_pose
+        if len(points) >= self._config.min_points:
+            _, source = self._icp.register_frame(points, np.zeros(0))
+            moved = invert(T_odom_prev) @ self._icp.last_pose
+            if not self._started or self._is_plausible(moved, T_prev_cur):
+                return self._accept(frame.timestamp, moved, source)
+        return self._lose(frame.timestamp, T_odom_prev, points)
+
+    def _accept(self, timestamp: float, moved: FloatArray, source: FloatArray) -> Motion:
+        self._prediction.tracked(timestamp, moved if self._started else np.eye(4))
+        if not self._started:
+            self._started = True
+            return first_motion()
+        status = TrackingStatus.OK if self._lost_since is None else TrackingStatus.RELOCALISED
+        self._lost_since = None
+        return Motion(moved, self._covariance(source), status, self._map_id, len(source))
+
+    def _lose(self, timestamp: float, T_odom_prev: FloatArray, points: FloatArray) -> Motion:
+        if not self._started:
+            self._started = True
+            self._prediction.tracked(timestamp, np.eye(4))
+            return first_motion()
+        self._lost_since = timestamp if self._lost_since is None else self._lost_since
+        # A scan that the map does not meet has been written into it, so the map starts anew.
+        if len(points) >= self._config.min_points:
+            self._icp = _make_icp(self._config)
+            self._icp.last_pose = T_odom_prev
+            self._map_id += 1
+        motion = self._prediction.lost(timestamp, self._map_id)
+        self._icp.last_pose = T_odom_prev @ motion.T_prev_cur
+        return motion
+
+    def _is_plausible(self, moved: FloatArray, predicted: FloatArray) -> bool:
+        if not is_rigid(moved):
+            return False
+        surprise = invert(predicted) @ moved
+        return bool(
+            np.linalg.norm(surprise[:3, 3]) <= self._config.max_surprise
+            and rotation_angle(surprise) <= self._config.max_surprise_rotation
+        )
+
+    def _covariance(self, source: FloatArray) -> FloatArray:
+        """Of point-to-point ICP: how well points of this spread fix a pose, scaled to the errors met in practice."""
+        x, y, z = source.T
+        zero, one = np.zeros(len(source)), np.ones(len(source))
+        rows = [[zero, z, -y, one, zero, zero], [-z, zero, x, zero, one, zero], [y, -x, zero, zero, zero, one]]
+        J = np.concatenate([np.column_stack(row) for row in rows])
+        return np.linalg.inv(J.T @ J + 1e-6 * np.eye(6)) * self._config.sigma**2
+
+
+def _make_icp(config: KissConfig) -> Any:
+    from kiss_icp.config.parser import KISSConfig
+    from kiss_icp.kiss_icp import KissICP
+
+    settings = KISSConfig()
+    settings.data.max_range = config.max_range
+    settings.data.deskew = False
+    settings.mapping.voxel_size = config.voxel
+    settings.adaptive_threshold.initial_threshold = config.initial_threshold
+    settings.adaptive_threshold.min_motion_th = config.min_motion
+    settings.registration.max_num_threads = 1
+    return KissICP(settings)

@@ -1,0 +1,70 @@
+"""Where the camera will be, before its image is looked at; and what to say of a frame that could not be tracked."""
+
+import numpy as np
+
+from semslam.errors import DatasetError
+from semslam.geometry import exp_so3, log_so3, make_transform
+from semslam.types import FloatArray, Frame, Motion, TrackingStatus
+
+COAST_SECONDS = 0.3
+"""How long a lost camera is taken to keep its velocity; after that it is taken to rest."""
+LOST_ROTATION = 1.0
+LOST_TRANSLATION = 0.5
+"""Radians and metres, standard deviations after one lost second; they grow with the square root of time."""
+
+
+class ConstantVelocity:
+    """A camera keeps its velocity from frame to frame, and for a moment when it is lost."""
+
+    def __init__(self) -> None:
+        self._timestamp: float | None = None
+        self._tracked_at = -np.inf
+        self._velocity = np.zeros(6)
+
+    def predict(self, timestamp: float) -> FloatArray:
+        """Motion T_prev_cur (4, 4) from the last frame to one at ``timestamp`` seconds."""
+        if self._timestamp is None or timestamp - self._tracked_at > COAST_SECONDS:
+            return np.eye(4)
+        step = self._velocity * (timestamp - self._timestamp)
+        return make_transform(exp_so3(step[:3]), step[3:])
+
+    def tracked(self, timestamp: float, T_prev_cur: FloatArray) -> None:
+        """Take in a measured motion from the last frame to the one at ``timestamp``."""
+        elapsed = timestamp - self._timestamp if self._timestamp is not None else 0.0
+        known = elapsed > 0 and self._timestamp == self._tracked_at
+        # After a lost spell the motion holds the error of the prediction too; it is no velocity.
+        tangent = np.concatenate([log_so3(T_prev_cur[:3, :3]), T_prev_cur[:3, 3]])
+        self._velocity = tangent / elapsed if known else np.zeros(6)
+        self._timestamp = self._tracked_at = timestamp
+
+    def lost(self, timestamp: float, map_id: int) -> Motion:
+        """What to report of a frame at ``timestamp`` that could not be tracked: a predicted motion, hardly certain."""
+        motion = self.predict(timestamp)
+        elapsed = timestamp - self._timestamp if self._timestamp is not None else 0.0
+        self._timestamp = timestamp
+        return Motion(motion, wide_covariance(elapsed), TrackingStatus.LOST, map_id)
+
+
+def wide_covariance(seconds: float) -> FloatArray:
+    """Covariance (6, 6) of an unmeasured motion over a time; never singular."""
+    seconds = max(seconds, 1e-3)
+    return np.diag([LOST_ROTATION**2 * seconds] * 3 + [LOST_TRANSLATION**2 * seconds] * 3)
+
+
+def first_motion(map_id: int = 0) -> Motion:
+    """What every odometry says of its first frame: identity, all but certain."""
+    return Motion(np.eye(4), np.eye(6) * 1e-12, TrackingStatus.OK, map_id)
+
+
+def check_frame(frame: Frame) -> None:
+    """Refuse a frame whose images do not fit its camera.
+
+    Raises:
+        DatasetError: colour or depth has another size than the intrinsics, or colour has not three channels.
+    """
+    size = (frame.intrinsics.height, frame.intrinsics.width)
+    if frame.color.shape != (*size, 3) or frame.depth.shape != size:
+        raise DatasetError(
+            f"Frame {frame.index} has colour {frame.color.shape} and depth {frame.depth.shape}, "
+            f"but its camera has {size[1]} x {size[0]} pixels."
+        )
