@@ -1,8 +1,17 @@
 """Fixtures that many tests use."""
 
+from collections.abc import Iterator
+from dataclasses import dataclass, field
 from pathlib import Path
 
+import cv2
+import numpy as np
 import pytest
+
+from semslam.camera import Intrinsics
+from semslam.errors import DatasetError
+from semslam.geometry import make_transform
+from semslam.types import Frame, Trajectory
 
 SHARED = Path(__file__).resolve().parents[2] / "shared"
 
@@ -13,3 +22,63 @@ def shared() -> Path:
     if not (SHARED / "data").is_dir():
         pytest.skip(f"the real data is not here ({SHARED})")
     return SHARED
+
+
+@dataclass(frozen=True)
+class WallDataset:
+    """A camera that slides along a poster 1.5 m away, 4 pixels a frame: poses are known exactly.
+
+    Attributes:
+        unreadable: frames that cannot be read.
+        interrupt_at: frame whose reading is interrupted by Ctrl-C.
+    """
+
+    frames: int = 12
+    unreadable: tuple[int, ...] = ()
+    interrupt_at: int | None = None
+    name: str = "wall"
+    intrinsics: Intrinsics = field(default=Intrinsics(320, 240, 260.0, 260.0, 159.5, 119.5))
+    depth: float = 1.5
+    step: int = 4
+
+    @property
+    def timestamps(self) -> list[float]:
+        return [0.1 * i for i in range(self.frames)]
+
+    @property
+    def ground_truth(self) -> Trajectory:
+        metres = self.step * self.depth / self.intrinsics.fx
+        poses = np.stack([make_transform(np.eye(3), [metres * i, 0, 0]) for i in range(self.frames)])
+        return Trajectory(np.array(self.timestamps), poses)
+
+    @property
+    def notes(self) -> list[str]:
+        return []
+
+    def __len__(self) -> int:
+        return self.frames
+
+    def frame(self, index: int) -> Frame:
+        if index == self.interrupt_at:
+            raise KeyboardInterrupt
+        if index in self.unreadable:
+            raise DatasetError(f"{index:06d}.png is truncated.")
+        camera = self.intrinsics
+        poster = _poster(camera.height, camera.width + self.step * self.frames)
+        color = np.ascontiguousarray(poster[:, self.step * index : self.step * index + camera.width])
+        depth = np.full((camera.height, camera.width), self.depth, dtype=np.float32)
+        return Frame(index, self.timestamps[index], color, depth, camera)
+
+    def __iter__(self) -> Iterator[Frame]:
+        return (self.frame(index) for index in range(self.frames))
+
+
+def _poster(height: int, width: int) -> np.ndarray:
+    noise = np.random.default_rng(7).integers(0, 256, (height // 6 + 1, width // 6 + 1, 3), dtype=np.uint8)
+    return cv2.resize(noise, (6 * noise.shape[1], 6 * noise.shape[0]), interpolation=cv2.INTER_NEAREST)[:height, :width]
+
+
+@pytest.fixture
+def wall() -> WallDataset:
+    """A short sequence with exact poses."""
+    return WallDataset()
