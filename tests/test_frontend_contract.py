@@ -9,8 +9,8 @@ from frontend.odometry import Odometry
 from semslam import plugins
 from semslam.camera import Intrinsics
 from semslam.config import Config
-from semslam.datasets.dataset import Dataset
 from semslam.datasets import open_dataset
+from semslam.datasets.dataset import Dataset
 from semslam.errors import DatasetError
 from semslam.geometry import is_rigid
 from semslam.types import Frame, Motion, TrackingStatus
