@@ -114,6 +114,9 @@ def _unpack(archive: Path, target: Path) -> None:
             raise DatasetError(f"The archive {archive} does not hold the folder {target.name}.")
         (work / target.name).replace(target)
         archive.unlink()
+    except DatasetError:
+        archive.unlink()
+        raise
     except (tarfile.TarError, EOFError, zlib.error, gzip.BadGzipFile) as error:
         archive.unlink()
         raise DatasetError(f"The archive {archive} is damaged ({error}); it was removed, so run it again.") from error
