@@ -19,9 +19,20 @@ def prior_factor(key: int, T_world_cam: FloatArray, sigma: float) -> gtsam.Prior
     return gtsam.PriorFactorPose3(key, gtsam.Pose3(T_world_cam), gtsam.noiseModel.Isotropic.Sigma(6, sigma))
 
 
-def between_factor(edge: Edge, kernel: gtsam.noiseModel.mEstimator.Base | None = None) -> gtsam.BetweenFactorPose3:
-    """A between-factor with the edge's full covariance, inside a robust ``kernel`` where one is given."""
-    noise: gtsam.noiseModel.Base = gtsam.noiseModel.Gaussian.Covariance(edge.covariance)
+def between_factor(
+    edge: Edge,
+    kernel: gtsam.noiseModel.mEstimator.Base | None = None,
+    noise: gtsam.noiseModel.Base | None = None,
+) -> gtsam.BetweenFactorPose3:
+    """A between-factor of an edge.
+
+    Args:
+        edge: what was measured.
+        kernel: robust kernel around the noise model.
+        noise: the noise model; none = the edge's full covariance.
+    """
+    if noise is None:
+        noise = gtsam.noiseModel.Gaussian.Covariance(edge.covariance)
     if kernel is not None:
         noise = gtsam.noiseModel.Robust.Create(kernel, noise)
     return gtsam.BetweenFactorPose3(edge.from_key, edge.to_key, gtsam.Pose3(edge.T_from_to), noise)

@@ -1,25 +1,12 @@
 """The pose graph: keyframes, odometry, loops; one robust optimisation, a verdict for each loop."""
 
-import gtsam
-import numpy as np
 import numpy.typing as npt
 
 from backend.checks import checked_covariance, checked_pose
-from backend.components import connected_components, place_components
-from backend.factors import (
-    ANCHOR_SIGMA,
-    FLOATING_SIGMA,
-    between_factor,
-    mahalanobis,
-    make_values,
-    prior_factor,
-    read_poses,
-)
-from backend.products import Edge, GraphSolution, LoopVerdict, PosedGraph
-from backend.robust import RobustProblem, RobustSolution, solve_robustly
+from backend.optimization import GraphProblem, optimize_graph
+from backend.products import Edge, GraphSolution, LoopVerdict, PosedGraph, loop_edge
 from semslam.config import BackendConfig
 from semslam.errors import GraphError
-from semslam.geometry import invert
 from semslam.types import FloatArray, LoopConstraint
 
 __all__ = ["Edge", "GraphSolution", "LoopVerdict", "PoseGraph", "PosedGraph"]
@@ -114,27 +101,13 @@ class PoseGraph:
         """
         if not self._poses:
             raise GraphError("The pose graph has no keyframe.")
-        loops = [loop_edge(constraint) for constraint in self._loops.values()]
-        maps = sorted(connected_components(self._poses, self._odometry.values()))
-        start = place_components(self._anchored(maps), maps, loops)
-        trusted = self._trusted(maps, start)
-        limit = self._config.max_residual
-        problem = RobustProblem(trusted, loops, make_values(start), limit, self._config.max_iterations)
-        result = solve_robustly(self._config.robust, problem)
-        poses = read_poses(result.values, self._poses)
-        verdicts = self._judge(result, loops, poses)
-        kept = [edge for edge, verdict in zip(loops, verdicts, strict=True) if verdict.accepted]
-        components = connected_components(self._poses, [*self._odometry.values(), *kept])
-        weighted = sum(0.5 * v.weight * v.residual**2 for v in verdicts)
-        return GraphSolution(
-            poses=self._returned_home(poses, components),
-            verdicts=verdicts,
-            edges=(*self._odometry.values(), *kept),
-            anchors=tuple(self._anchor(component)[0] for component in components),
-            cost=float(trusted.error(result.values) + weighted),
-            components=tuple(components),
-            covariances=_marginals(trusted, kept, result.values, self._poses) if marginals else None,
+        problem = GraphProblem(
+            poses=dict(self._poses),
+            priors=dict(self._priors),
+            odometry=tuple(self._odometry.values()),
+            constraints=tuple(self._loops.values()),
         )
+        return optimize_graph(problem, self._config, marginals)
 
     def _require(self, key: int) -> None:
         if key not in self._poses:
@@ -145,65 +118,3 @@ class PoseGraph:
         self._require(to_key)
         if from_key == to_key:
             raise GraphError(f"Keyframe {from_key} cannot be joined to itself.")
-
-    def _anchor(self, component: tuple[int, ...]) -> tuple[int, FloatArray]:
-        key = next((key for key in component if key in self._priors), component[0])
-        return key, self._priors.get(key, self._poses[key])
-
-    def _anchored(self, maps: list[tuple[int, ...]]) -> dict[int, FloatArray]:
-        poses: dict[int, FloatArray] = {}
-        for component in maps:
-            key, T_world_cam = self._anchor(component)
-            move = T_world_cam @ invert(self._poses[key])
-            poses.update({key: move @ self._poses[key] for key in component})
-        return {key: poses[key] for key in self._poses}
-
-    def _trusted(self, maps: list[tuple[int, ...]], start: dict[int, FloatArray]) -> gtsam.NonlinearFactorGraph:
-        graph = gtsam.NonlinearFactorGraph()
-        for index, component in enumerate(maps):
-            key, _ = self._anchor(component)
-            graph.add(prior_factor(key, start[key], FLOATING_SIGMA if index else ANCHOR_SIGMA))
-        for edge in self._odometry.values():
-            graph.add(between_factor(edge))
-        return graph
-
-    def _judge(
-        self, result: RobustSolution, loops: list[Edge], poses: dict[int, FloatArray]
-    ) -> tuple[LoopVerdict, ...]:
-        verdicts = []
-        for constraint, edge, weight in zip(self._loops.values(), loops, result.weights, strict=True):
-            residual = mahalanobis(edge, poses)
-            accepted = self._config.robust == "none" or (weight > 0 and residual <= self._config.max_residual)
-            verdicts.append(LoopVerdict(constraint, float(weight), bool(accepted), residual))
-        return tuple(verdicts)
-
-    def _returned_home(self, poses: dict[int, FloatArray], components: list[tuple[int, ...]]) -> dict[int, FloatArray]:
-        # A map that was placed by loops which then turned out false goes back to its own anchor.
-        home: dict[int, FloatArray] = {}
-        for component in components:
-            key, T_world_cam = self._anchor(component)
-            move = T_world_cam @ invert(poses[key])
-            home.update({k: move @ poses[k] for k in component})
-        return {key: home[key] for key in self._poses}
-
-
-def loop_edge(constraint: LoopConstraint) -> Edge:
-    """The edge, match to query, of a verified loop.
-
-    Raises:
-        GraphError: its pose or covariance is not usable.
-    """
-    match, query = constraint.candidate.match, constraint.candidate.query
-    what = f"The loop from {match} to {query}"
-    T = checked_pose(constraint.T_match_query, what)
-    return Edge(match, query, T, checked_covariance(constraint.covariance, what))
-
-
-def _marginals(
-    trusted: gtsam.NonlinearFactorGraph, kept: list[Edge], values: gtsam.Values, keys: dict[int, FloatArray]
-) -> dict[int, FloatArray]:
-    graph = gtsam.NonlinearFactorGraph(trusted)
-    for edge in kept:
-        graph.add(between_factor(edge))
-    marginals = gtsam.Marginals(graph, values)
-    return {key: np.asarray(marginals.marginalCovariance(key)) for key in keys}

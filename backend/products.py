@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from backend.checks import checked_covariance, checked_pose
 from semslam.types import FloatArray, LoopConstraint
 
 
@@ -64,6 +65,8 @@ class GraphSolution:
         edges: odometry, then the accepted loops.
         anchors: the first keyframe of each component, or the one with a prior.
         cost: half the weighted sum of squared residuals of odometry and loops.
+        odometry_scale: factor by which odometry's standard deviations were widened (see ``backend.calibration``).
+        loop_scale: the same of the loops'.
         components: keys that hang together by odometry and accepted loops; the largest set first.
         covariances: (6, 6) marginals by key where they were asked for.
     """
@@ -73,5 +76,19 @@ class GraphSolution:
     edges: tuple[Edge, ...]
     anchors: tuple[int, ...]
     cost: float
+    odometry_scale: float
+    loop_scale: float
     components: tuple[tuple[int, ...], ...]
     covariances: dict[int, FloatArray] | None = None
+
+
+def loop_edge(constraint: LoopConstraint) -> Edge:
+    """The edge, match to query, of a verified loop.
+
+    Raises:
+        GraphError: its pose or covariance is not usable.
+    """
+    match, query = constraint.candidate.match, constraint.candidate.query
+    what = f"The loop from {match} to {query}"
+    T = checked_pose(constraint.T_match_query, what)
+    return Edge(match, query, T, checked_covariance(constraint.covariance, what))

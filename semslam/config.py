@@ -235,14 +235,14 @@ class VerificationConfig(Section):
     icp_distances: tuple[float, ...] = Field((0.1, 0.05), description="metres, correspondence limit of each ICP pass")
     max_shift: float = Field(20.0, gt=0, description="pixels, median, by which ICP may move the agreeing matches")
     fit_distance: float = Field(0.05, gt=0, description="metres within which a point meets the other surface")
-    min_fitness: float = Field(0.2, ge=0, le=1, description="share of the query's points that meet the match's surface")
+    min_fitness: float = Field(0.25, ge=0, le=1, description="share of the query's points that meet the match's surface")
     max_rmse: float = Field(0.035, gt=0, description="metres, over those points")
     overlap_distance: float = Field(0.1, gt=0, description="metres within which a point counts as seen by the other")
-    min_overlap: float = Field(0.2, ge=0, le=1, description="share of either view that the other must see")
+    min_overlap: float = Field(0.15, ge=0, le=1, description="share of either view that the other must see")
     max_free_space: float = Field(0.1, ge=0, le=1, description="share of points that may stand in seen-through space")
     max_sigma: float = Field(0.25, gt=0, description="metres, standard deviation of the position at the most")
-    icp_inflation: float = Field(100.0, gt=0, description="factor on ICP's formal variance: points err together")
-    pnp_inflation: float = Field(10.0, gt=0, description="factor on PnP's formal variance")
+    icp_inflation: float = Field(50.0, gt=0, description="factor on ICP's formal variance: points err together")
+    pnp_inflation: float = Field(30.0, gt=0, description="factor on PnP's formal variance")
     sigma_rotation: float = Field(0.015, ge=0, description="radians, error that no formal variance knows of")
     sigma_translation: float = Field(0.02, ge=0, description="metres, the same")
 
@@ -255,6 +255,12 @@ class BackendConfig(Section):
         4.1, gt=0, description="Mahalanobis distance at which a loop is taken for false; 4.1 = 99 % of true ones"
     )
     max_iterations: int = Field(100, gt=0, description="Levenberg-Marquardt steps at the most")
+    max_odometry_scale: float = Field(
+        10.0, ge=1, description="how far odometry's deviations may be widened where most loops contradict them"
+    )
+    max_loop_scale: float = Field(
+        3.0, ge=1, description="how far the loops' deviations may be widened where neighbouring ones disagree"
+    )
 
 
 class Config(Section):

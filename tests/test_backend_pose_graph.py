@@ -1,55 +1,33 @@
 """The pose graph on rings of poses whose truth is exact."""
 
-from itertools import pairwise
-
 import numpy as np
 import pytest
 
-from backend.pose_graph import PoseGraph
+from backend.pose_graph import Edge, PoseGraph
 from backend.robust import STRATEGIES
+from backend.simulation import SIGMAS, as_constraint, measure_odometry, noisy, ring
 from semslam.config import BackendConfig
 from semslam.errors import ConfigError, GraphError
 from semslam.geometry import compose, exp_so3, invert, make_transform, rotation_angle
-from semslam.types import LoopCandidate, LoopConstraint
 
-SIGMAS = np.array([0.005] * 3 + [0.01] * 3)
 COVARIANCE = np.diag(SIGMAS**2)
 ROBUST = ["gnc", "dcs"]
 
 
-def ring(count=40, laps=2, radius=2.0):
-    """Cameras on a ring that look along it; the second lap passes where the first did."""
-    angles = np.linspace(0, 2 * np.pi * laps, count, endpoint=False)
-    return np.stack(
-        [
-            make_transform(
-                exp_so3([0.0, 0.0, a + np.pi / 2]), [radius * np.cos(a), radius * np.sin(a), 0.1 * np.sin(2 * a)]
-            )
-            for a in angles
-        ]
-    )
-
-
-def noisy(T, rng, scale=1.0):
-    x = rng.normal(size=6) * SIGMAS * scale
-    return T @ make_transform(exp_so3(x[:3]), x[3:])
-
-
 def make_loop(match, query, T_match_query, covariance=COVARIANCE):
-    candidate = LoopCandidate(query, match, 1.0, "test")
-    return LoopConstraint(candidate, T_match_query, covariance, 1.0, 0.01, 1.0, 50, "pnp")
+    return as_constraint(Edge(match, query, T_match_query, covariance))
 
 
 def make_graph(truth, rng, false_loops=0, config=None, scale=1.0):
     """Noisy odometry around the ring, a true loop from each second keyframe of the second lap, and false ones."""
-    motions = [noisy(invert(a) @ b, rng, scale) for a, b in pairwise(truth)]
-    odometry = compose(motions, truth[0])
+    edges = measure_odometry(truth, rng, scale)
+    odometry = compose([edge.T_from_to for edge in edges], truth[0])
     graph = PoseGraph(config)
     for key, pose in enumerate(odometry):
         graph.add_keyframe(key, pose)
     graph.add_prior(0, truth[0])
-    for key, motion in enumerate(motions):
-        graph.add_odometry(key, key + 1, motion, COVARIANCE)
+    for edge in edges:
+        graph.add_odometry(edge.from_key, edge.to_key, edge.T_from_to, edge.covariance)
     lap = len(truth) // 2
     for query in range(lap, len(truth), 2):
         match = query - lap

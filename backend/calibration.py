@@ -1,0 +1,106 @@
+"""Whether the stated covariances can be believed: loops that agree with one another tell.
+
+A front end that drifts by a bias it does not know of states too small a covariance; every true loop then looks
+false. Where most loops contradict odometry, odometry is what is wrong, and its covariance is widened until a
+quarter of the loops, fewer than may be expected to be true, lie as they should.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from backend.chain import BoolArray, OdometryChain, adjoints, deviations, squared_mahalanobis
+from backend.products import Edge
+from semslam.geometry import invert
+from semslam.types import FloatArray
+
+QUORUM = 5
+"""Fewer loops than this are no evidence against odometry."""
+QUARTILE, QUARTILE_CHI2 = 25.0, 3.4546
+"""A quarter of true loops lie below this squared Mahalanobis distance (6 degrees of freedom)."""
+MEDIAN, MEDIAN_CHI2 = 50.0, 5.3481
+TOLERANCE = 1.5
+"""Smaller factors are taken for chance and left at 1."""
+STEPS = 12
+"""Halvings of the search for a factor."""
+NEIGHBOURHOOD = 3
+"""Loops whose ends lie at most so many keyframes apart are compared with one another."""
+
+
+def odometry_scale(chain: OdometryChain, loops: Sequence[Edge], limit: float) -> float:
+    """Factor (1 to ``limit``) on odometry's standard deviations that makes it agree with a quarter of the loops."""
+    if not loops:
+        return 1.0
+    T_odometry, odometry, joined = chain.relative([e.from_key for e in loops], [e.to_key for e in loops])
+    left = deviations(invert(np.stack([loop.T_from_to for loop in loops])) @ T_odometry)
+    own = np.stack([loop.covariance for loop in loops])
+    return _smallest_scale(left[joined], own[joined], odometry[joined], limit, QUARTILE, QUARTILE_CHI2)
+
+
+def loop_scale(chain: OdometryChain, loops: Sequence[Edge], limit: float) -> float:
+    """Factor (1 to ``limit``) on the loops' standard deviations that makes neighbouring loops agree.
+
+    Two loops whose ends are neighbours close a short cycle in which odometry has no room to drift.
+    """
+    pairs = _neighbours(loops)
+    if not pairs:
+        return 1.0
+    left, own, odometry, joined = cycles(chain, [loops[i] for i, _ in pairs], [loops[j] for _, j in pairs])
+    return _smallest_scale(left[joined], odometry[joined], own[joined], limit, MEDIAN, MEDIAN_CHI2)
+
+
+def cycles(
+    chain: OdometryChain, first: Sequence[Edge], second: Sequence[Edge]
+) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
+    """How far pairs of loops are from closing a cycle with the odometry between their ends.
+
+    Returns:
+        (P, 6) what is left when going round, (P, 6, 6) its covariance from the two loops, (P, 6, 6) from odometry,
+        and (P,) whether odometry joins both ends.
+    """
+    T_m1_q1 = np.stack([loop.T_from_to for loop in first])
+    T_m2_q2 = np.stack([loop.T_from_to for loop in second])
+    T_m1_m2, C_m, joined_m = chain.relative([e.from_key for e in first], [e.from_key for e in second])
+    T_q1_q2, C_q, joined_q = chain.relative([e.to_key for e in first], [e.to_key for e in second])
+    # Round the cycle, everything expressed at the second loop's query.
+    left = invert(T_m1_m2 @ T_m2_q2) @ T_m1_q1 @ T_q1_q2
+    carry_1, carry_m = adjoints(invert(T_q1_q2)), adjoints(invert(T_m2_q2))
+    C_1 = np.stack([loop.covariance for loop in first])
+    C_2 = np.stack([loop.covariance for loop in second])
+    own = C_2 + carry_1 @ C_1 @ np.swapaxes(carry_1, 1, 2)
+    odometry = C_q + carry_m @ C_m @ np.swapaxes(carry_m, 1, 2)
+    return deviations(left), own, odometry, joined_m & joined_q
+
+
+def _neighbours(loops: Sequence[Edge]) -> list[tuple[int, int]]:
+    """Index pairs of loops whose ends lie close together; each loop is paired with the next such one."""
+    order = sorted(range(len(loops)), key=lambda i: (loops[i].to_key, loops[i].from_key))
+    pairs = []
+    for place, i in enumerate(order):
+        for j in order[place + 1 :]:
+            if loops[j].to_key - loops[i].to_key > NEIGHBOURHOOD:
+                break
+            if abs(loops[j].from_key - loops[i].from_key) <= NEIGHBOURHOOD:
+                pairs.append((i, j))
+                break
+    return pairs
+
+
+def _smallest_scale(
+    left: FloatArray, fixed: FloatArray, scaled: FloatArray, limit: float, percentile: float, expected: float
+) -> float:
+    """Smallest factor on ``scaled``'s deviations that brings a percentile of the squared distances down to chance."""
+    if len(left) < QUORUM:
+        return 1.0
+
+    def fits(scale: float) -> bool:
+        distances = squared_mahalanobis(left, fixed + scale**2 * scaled)
+        return bool(np.percentile(distances, percentile) <= expected)
+
+    if limit <= TOLERANCE or fits(TOLERANCE):
+        return 1.0
+    low, high = TOLERANCE, limit
+    for _ in range(STEPS):
+        middle = np.sqrt(low * high)
+        low, high = (low, middle) if fits(middle) else (middle, high)
+    return float(high)

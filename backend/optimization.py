@@ -1,0 +1,144 @@
+"""From a checked graph to a solution: maps placed, covariances believed or widened, loops judged."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import gtsam
+import numpy as np
+
+from backend.calibration import loop_scale, odometry_scale
+from backend.chain import OdometryChain
+from backend.components import connected_components, place_components
+from backend.factors import (
+    ANCHOR_SIGMA,
+    FLOATING_SIGMA,
+    between_factor,
+    mahalanobis,
+    make_values,
+    prior_factor,
+    read_poses,
+)
+from backend.products import Edge, GraphSolution, LoopVerdict, loop_edge
+from backend.robust import RobustProblem, RobustSolution, solve_robustly
+from semslam.config import BackendConfig
+from semslam.geometry import invert
+from semslam.types import FloatArray, LoopConstraint
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GraphProblem:
+    """A graph to optimise; everything in it has been checked.
+
+    Attributes:
+        poses: (4, 4) T_world_cam to start from, by key.
+        priors: (4, 4) T_world_cam at which maps are anchored, by key.
+        odometry: edges that are trusted.
+        constraints: loops, which may be false.
+    """
+
+    poses: Mapping[int, FloatArray]
+    priors: Mapping[int, FloatArray]
+    odometry: Sequence[Edge]
+    constraints: Sequence[LoopConstraint]
+
+    def anchor(self, component: Sequence[int]) -> int:
+        """The key that holds a component: the first with a prior, or else the first."""
+        return next((key for key in component if key in self.priors), component[0])
+
+    def anchored(self, poses: Mapping[int, FloatArray], component: Sequence[int]) -> dict[int, FloatArray]:
+        """A component's poses, moved rigidly so that its anchor stands where it should."""
+        key = self.anchor(component)
+        move = self.priors.get(key, self.poses[key]) @ invert(poses[key])
+        return {k: move @ poses[k] for k in component}
+
+
+def optimize_graph(problem: GraphProblem, config: BackendConfig, marginals: bool = False) -> GraphSolution:
+    """Optimise robustly and judge each loop.
+
+    Args:
+        problem: the graph, with at least one keyframe.
+        config: strategy and limits.
+        marginals: also work out each pose's covariance.
+
+    Raises:
+        GraphError: the optimiser failed.
+        ConfigError: the strategy's name is unknown.
+    """
+    edges = [loop_edge(constraint) for constraint in problem.constraints]
+    maps = sorted(connected_components(problem.poses, problem.odometry))
+    start: dict[int, FloatArray] = {}
+    for component in maps:
+        start.update(problem.anchored(problem.poses, component))
+    start = place_components(start, maps, edges)
+    odometry_factor, loop_factor = _scales(problem, edges, config)
+    loops = _widened(edges, loop_factor)
+    trusted = _trusted(problem, maps, start, odometry_factor)
+    result = solve_robustly(
+        config.robust, RobustProblem(trusted, loops, make_values(start), config.max_residual, config.max_iterations)
+    )
+    poses = read_poses(result.values, problem.poses)
+    verdicts = _judge(problem, result, loops, poses, config)
+    accepted = np.array([verdict.accepted for verdict in verdicts], dtype=bool)
+    kept = [edge for edge, good in zip(edges, accepted, strict=True) if good]
+    components = connected_components(problem.poses, [*problem.odometry, *kept])
+    home: dict[int, FloatArray] = {}
+    for component in components:  # a map that only false loops had moved goes back to its own anchor
+        home.update(problem.anchored(poses, component))
+    return GraphSolution(
+        poses={key: home[key] for key in problem.poses},
+        verdicts=verdicts,
+        edges=(*problem.odometry, *kept),
+        anchors=tuple(problem.anchor(component) for component in components),
+        cost=float(trusted.error(result.values) + sum(0.5 * v.weight * v.residual**2 for v in verdicts)),
+        odometry_scale=odometry_factor,
+        loop_scale=loop_factor,
+        components=tuple(components),
+        covariances=_marginals(trusted, _widened(kept, loop_factor), result.values) if marginals else None,
+    )
+
+
+def _scales(problem: GraphProblem, loops: Sequence[Edge], config: BackendConfig) -> tuple[float, float]:
+    chain = OdometryChain(problem.poses, problem.odometry)
+    of_loops = loop_scale(chain, loops, config.max_loop_scale)
+    return odometry_scale(chain, _widened(loops, of_loops), config.max_odometry_scale), of_loops
+
+
+def _widened(edges: Sequence[Edge], factor: float) -> list[Edge]:
+    return [replace(edge, covariance=edge.covariance * factor**2) for edge in edges]
+
+
+def _trusted(
+    problem: GraphProblem, maps: Sequence[Sequence[int]], start: Mapping[int, FloatArray], factor: float
+) -> gtsam.NonlinearFactorGraph:
+    graph = gtsam.NonlinearFactorGraph()
+    for index, component in enumerate(maps):
+        key = problem.anchor(component)
+        graph.add(prior_factor(key, start[key], FLOATING_SIGMA if index else ANCHOR_SIGMA))
+    for edge in _widened(problem.odometry, factor):
+        graph.add(between_factor(edge))
+    return graph
+
+
+def _judge(
+    problem: GraphProblem,
+    result: RobustSolution,
+    loops: Sequence[Edge],
+    poses: Mapping[int, FloatArray],
+    config: BackendConfig,
+) -> tuple[LoopVerdict, ...]:
+    verdicts = []
+    for constraint, edge, weight in zip(problem.constraints, loops, result.weights, strict=True):
+        residual = mahalanobis(edge, poses)
+        accepted = config.robust == "none" or (weight > 0 and residual <= config.max_residual)
+        verdicts.append(LoopVerdict(constraint, float(weight), bool(accepted), residual))
+    return tuple(verdicts)
+
+
+def _marginals(
+    trusted: gtsam.NonlinearFactorGraph, kept: Sequence[Edge], values: gtsam.Values
+) -> dict[int, FloatArray]:
+    graph = gtsam.NonlinearFactorGraph(trusted)
+    for edge in kept:
+        graph.add(between_factor(edge))
+    marginals = gtsam.Marginals(graph, values)
+    return {key: np.asarray(marginals.marginalCovariance(key)) for key in values.keys()}  # noqa: SIM118
