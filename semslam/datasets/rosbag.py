@@ -65,7 +65,9 @@ class RosbagDataset:
     @classmethod
     def recognises(cls, path: Path) -> bool:
         """Whether the path is named like a bag."""
-        return (path.is_file() and path.suffix == ".bag") or (path / "metadata.yaml").is_file()
+        if path.is_file():
+            return path.suffix == ".bag"
+        return (path / "metadata.yaml").is_file() and any((*path.glob("*.db3"), *path.glob("*.mcap")))
 
     @classmethod
     def open(cls, path: str | Path, config: DatasetConfig) -> Self:
