@@ -2,10 +2,12 @@
 
 import subprocess
 import sys
+from importlib.metadata import EntryPoint
 from pathlib import Path
 
 import pytest
 
+from semslam import plugins
 from semslam.config import DatasetConfig
 from semslam.datasets import guess_loader, open_dataset
 from semslam.errors import ConfigError, DatasetError
@@ -54,3 +56,12 @@ def test_opening_is_light() -> None:
         "assert not heavy, heavy\n"
     )
     subprocess.run([sys.executable, "-c", code], check=True, timeout=120)
+
+
+def test_a_broken_plugin_does_not_keep_the_others_from_being_asked(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    broken = EntryPoint(name="broken", value="no_such_module:Loader", group="semslam.datasets")
+    monkeypatch.setattr(plugins, "entry_points", lambda group: [broken])
+    with pytest.warns(UserWarning, match="no_such_module"), pytest.raises(DatasetError, match="is no sequence"):
+        open_dataset(tmp_path)
