@@ -18,6 +18,11 @@ def test_a_path_that_does_not_exist_is_refused(tmp_path: Path) -> None:
         open_dataset(tmp_path / "nowhere")
 
 
+def test_a_path_that_the_system_refuses_is_one_sentence(tmp_path: Path) -> None:
+    with pytest.raises(DatasetError, match="cannot be read: File name too long"):
+        open_dataset(tmp_path / ("x" * 5000))
+
+
 def test_a_path_that_is_no_sequence_says_what_was_looked_for(tmp_path: Path) -> None:
     (tmp_path / "notes.txt").write_text("hello")
     for path in (tmp_path, tmp_path / "notes.txt"):

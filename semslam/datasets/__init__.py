@@ -34,8 +34,11 @@ def open_dataset(path: str | Path, config: DatasetConfig | None = None, *, loade
         ConfigError: the loader's name is unknown.
     """
     config = config or DatasetConfig()
-    name = loader or config.loader or guess_loader(path)
-    dataset: Dataset = plugins.load(GROUP, name).open(path, config)
+    try:
+        name = loader or config.loader or guess_loader(path)
+        dataset: Dataset = plugins.load(GROUP, name).open(path, config)
+    except OSError as error:
+        raise DatasetError(f"{path} cannot be read: {error.strerror or error}.") from error
     if config.faults != type(config.faults)():
         from semslam.datasets.faults import FaultyDataset
 
