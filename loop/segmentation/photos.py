@@ -1,0 +1,78 @@
+"""Folders in the NYUv2 layout: ``rgb/NAME.jpg``, ``labels40/NAME.png`` and lists of names."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from loop.segmentation.classes import CLASS_COUNT
+from semslam.errors import DatasetError
+
+UInt8Array = npt.NDArray[np.uint8]
+_SUFFIXES = (".jpg", ".jpeg", ".png")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Photo:
+    """A labelled photo: color (H, W, 3) uint8 RGB and labels (H, W) uint8, 0 = void."""
+
+    name: str
+    color: UInt8Array
+    labels: UInt8Array
+
+
+def list_names(directory: Path, split: str) -> list[str]:
+    """Names in a split file such as ``val.txt``; every labelled photo if there is no file of that name to ask for.
+
+    Raises:
+        DatasetError: the folder or file does not exist or names nothing.
+    """
+    path = directory / split
+    if not path.is_file():
+        raise DatasetError(f"There is no list of photos at {path}.")
+    names = path.read_text(encoding="utf-8").split()
+    if not names:
+        raise DatasetError(f"The list of photos {path} is empty.")
+    return names
+
+
+def read_color(path: Path) -> UInt8Array:
+    """Read an image as (H, W, 3) uint8 RGB.
+
+    Raises:
+        DatasetError: the file is missing or no image.
+    """
+    image = cv2.imread(str(path), cv2.IMREAD_COLOR) if path.is_file() else None
+    if image is None:
+        raise DatasetError(f"The photo {path} is missing or cannot be read.")
+    return np.ascontiguousarray(image[:, :, ::-1], dtype=np.uint8)
+
+
+def read_photo(directory: Path, name: str) -> Photo:
+    """Read one photo with its labels.
+
+    Raises:
+        DatasetError: a file is missing or damaged, sizes differ, or a label is not 0..40.
+    """
+    paths = [directory / "rgb" / f"{name}{suffix}" for suffix in _SUFFIXES]
+    color = read_color(next((p for p in paths if p.is_file()), paths[0]))
+    label_path = directory / "labels40" / f"{name}.png"
+    labels = cv2.imread(str(label_path), cv2.IMREAD_UNCHANGED) if label_path.is_file() else None
+    if labels is None or labels.ndim != 2:
+        raise DatasetError(f"The label image {label_path} is missing or not a one-channel PNG.")
+    if labels.shape != color.shape[:2]:
+        raise DatasetError(f"The label image {label_path} has another size than its photo.")
+    if labels.max(initial=0) > CLASS_COUNT:
+        raise DatasetError(f"The label image {label_path} holds labels beyond {CLASS_COUNT}.")
+    return Photo(name, color, labels.astype(np.uint8))
+
+
+def read_photos(directory: Path, split: str) -> list[Photo]:
+    """Read all photos of a split into memory.
+
+    Raises:
+        DatasetError: as ``list_names`` and ``read_photo``.
+    """
+    return [read_photo(directory, name) for name in list_names(directory, split)]

@@ -1,0 +1,215 @@
+"""Training on NYUv2-layout folders: resumable at any moment, and the same views for the same seed."""
+
+import csv
+import time
+from collections.abc import Callable
+from contextlib import nullcontext
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+import torch.nn.functional as F  # noqa: N812
+from torch import Tensor
+
+from loop.segmentation.augmentation import random_view
+from loop.segmentation.checkpoint import load_weights, read_tensors, save_atomically, save_weights
+from loop.segmentation.classes import CLASS_COUNT
+from loop.segmentation.fast_layers import enlarge
+from loop.segmentation.network import DeepLab, build_mobilenet_deeplab
+from loop.segmentation.photos import Photo, read_photos
+from loop.segmentation.pretrained import convert_ade20k, refresh_norms
+from semslam.config import Config, TrainingConfig
+from semslam.errors import ModelError
+
+LOSS_STRIDE = 2
+LOG_STEPS = 20
+NORM_IMAGES = 16
+WEIGHT_LIMITS = (0.3, 4.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """How far a training is: steps done and in all, and the recent mean loss."""
+
+    step: int
+    steps: int
+    loss: float
+
+
+def train(directory: Path, config: Config, out: Path, report: Callable[[Progress], None] = lambda _: None) -> Path:
+    """Train the network on ``directory/train.txt``; starts again where a killed run left off.
+
+    Writes in ``out``: ``state.pt`` (to resume), ``training.csv`` (step, rate, loss) and ``weights.pt`` (float16
+    average of the weights, current at every save).
+
+    Returns:
+        The path of the weights.
+
+    Raises:
+        DatasetError: the folder is not in the NYUv2 layout.
+        ModelError: the starting weights or the state to resume do not fit.
+    """
+    torch.set_num_threads(config.training.threads)
+    run = _Run(directory, config, out)
+    run.resume()
+    while run.step < run.steps:
+        run.advance()
+        if run.step % LOG_STEPS == 0:
+            report(Progress(run.step, run.steps, run.log()))
+        if run.save_is_due():
+            run.save()
+    run.save()
+    return run.out / "weights.pt"
+
+
+def class_weights(photos: list[Photo]) -> Tensor:
+    """Weights (40,) that fall with the square root of a class's share of pixels, clipped, mean 1."""
+    counts = np.sum([np.bincount(p.labels.ravel(), minlength=CLASS_COUNT + 1)[1:] for p in photos], axis=0)
+    weights = 1.0 / np.sqrt(np.maximum(counts / counts.sum(), 1e-4))
+    weights = weights / np.median(weights)
+    return torch.tensor(np.clip(weights, *WEIGHT_LIMITS), dtype=torch.float32)
+
+
+def learning_rate(step: int, steps: int, warmup: float) -> float:
+    """Share of the peak rate: a linear climb, then a cosine to nothing."""
+    rise = max(1, round(steps * warmup))
+    if step < rise:
+        return (step + 1) / rise
+    return 0.5 * (1.0 + float(np.cos(np.pi * (step - rise) / max(1, steps - rise))))
+
+
+class _Run:
+    """One training with all that must survive a kill."""
+
+    def __init__(self, directory: Path, config: Config, out: Path) -> None:
+        settings = self.settings = config.training
+        self.seed, self.out = config.seed, out
+        self.size = (config.segmentation.width, config.segmentation.height)
+        self.photos = read_photos(directory, "train.txt")
+        self.pseudo = [p for folder in settings.pseudo for p in read_photos(folder, "train.txt")]
+        self.steps = max(1, settings.epochs * len(self.photos) // settings.batch)
+        self.step = 0
+        self.weights = class_weights(self.photos)
+        torch.manual_seed(self.seed)
+        self.network = build_mobilenet_deeplab()
+        if settings.start is not None:
+            self._start_from(settings.start)
+        self.network.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+        self.average = {k: v.detach().clone() for k, v in self.network.state_dict().items()}
+        self.optimizer = _optimizer(self.network, settings)
+        self.losses: list[float] = []
+        self.saved_at = time.monotonic()
+
+    def _start_from(self, path: Path) -> None:
+        if "cls.weight" in read_tensors(path):
+            convert_ade20k(self.network, path)
+            views = self._batch(np.random.default_rng((self.seed, 0)), NORM_IMAGES)[0]
+            refresh_norms(self.network, views)
+        else:
+            load_weights(self.network, path)
+
+    def _batch(self, rng: np.random.Generator, count: int) -> tuple[Tensor, Tensor]:
+        """Views (B, 3, H, W) in -1..1 and class indices (B, H, W), -1 = void."""
+        views, labels = [], []
+        for _ in range(count):
+            pool = self.pseudo if self.pseudo and rng.random() < self.settings.pseudo_share else self.photos
+            view, label = random_view(pool[int(rng.integers(len(pool)))], *self.size, rng)
+            views.append(view)
+            labels.append(label)
+        images = torch.from_numpy(np.stack(views)).permute(0, 3, 1, 2).float() / 127.5 - 1.0
+        return images, torch.from_numpy(np.stack(labels).astype(np.int64)) - 1
+
+    def advance(self) -> None:
+        """One step of the optimiser; its views depend on seed and step alone."""
+        share = learning_rate(self.step, self.steps, self.settings.warmup)
+        for group in self.optimizer.param_groups:
+            group["lr"] = group["peak"] * share
+        torch.manual_seed(self.seed * 1_000_003 + self.step)
+        images, labels = self._batch(np.random.default_rng((self.seed, 1, self.step)), self.settings.batch)
+        self.network.train()
+        with _mixed_precision():
+            logits, _ = self.network(images.contiguous(memory_format=torch.channels_last))
+        target = labels[:, LOSS_STRIDE // 2 :: LOSS_STRIDE, LOSS_STRIDE // 2 :: LOSS_STRIDE]
+        logits = enlarge(logits.float(), 4 // LOSS_STRIDE)
+        loss = F.cross_entropy(logits, target, weight=self.weights, ignore_index=-1)
+        self.optimizer.zero_grad(set_to_none=True)
+        loss.backward()  # type: ignore[no-untyped-call]
+        torch.nn.utils.clip_grad_norm_(self.network.parameters(), 5.0)
+        self.optimizer.step()
+        self.step += 1
+        self._move_average()
+        self.losses.append(loss.item())
+
+    @torch.no_grad()
+    def _move_average(self) -> None:
+        # A young average follows faster, or it would still hold the starting weights.
+        keep = min(self.settings.average, (1 + self.step) / (10 + self.step))
+        for name, value in self.network.state_dict().items():
+            if value.is_floating_point():
+                self.average[name].lerp_(value, 1.0 - keep)
+            else:
+                self.average[name].copy_(value)
+
+    def log(self) -> float:
+        """Append the mean loss since the last call to the log, and return it."""
+        loss, self.losses = float(np.mean(self.losses)), []
+        path = self.out / "training.csv"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        fresh = not path.exists()
+        with path.open("a", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file)
+            if fresh:
+                writer.writerow(["step", "rate", "loss"])
+            writer.writerow([self.step, f"{self.optimizer.param_groups[0]['lr']:.3e}", f"{loss:.4f}"])
+        return loss
+
+    def save_is_due(self) -> bool:
+        return time.monotonic() - self.saved_at > self.settings.save_every
+
+    def save(self) -> None:
+        """Write the state to resume from and the averaged weights."""
+        state = {
+            "step": self.step, "steps": self.steps, "network": self.network.state_dict(), "average": self.average,
+            "optimizer": self.optimizer.state_dict(),
+        }  # fmt: skip
+        save_atomically(state, self.out / "state.pt")
+        averaged = build_mobilenet_deeplab()
+        averaged.load_state_dict(self.average)
+        save_weights(averaged, self.out / "weights.pt")
+        self.saved_at = time.monotonic()
+
+    def resume(self) -> None:
+        """Take up the state of a killed run, if there is one."""
+        path = self.out / "state.pt"
+        if not path.exists():
+            return
+        try:
+            state: dict[str, Any] = torch.load(path, map_location="cpu", weights_only=True)
+            self.network.load_state_dict(state["network"])
+            self.optimizer.load_state_dict(state["optimizer"])
+            self.average, self.step = state["average"], state["step"]
+            steps = state["steps"]
+        except Exception as error:  # torch raises many kinds for a damaged file
+            raise ModelError(f"The training state {path} is damaged; remove it to start afresh.") from error
+        if steps != self.steps:
+            raise ModelError(f"The training in {self.out} was begun with other settings; choose another folder.")
+
+
+def _optimizer(network: DeepLab, settings: TrainingConfig) -> torch.optim.AdamW:
+    groups: list[dict[str, Any]] = []
+    for part, share in ((network.encoder, settings.encoder_rate), (None, 1.0)):
+        inside = {id(p) for p in network.encoder.parameters()}
+        parameters = [p for p in network.parameters() if (id(p) in inside) == (part is not None)]
+        for decays in (True, False):
+            chosen = [p for p in parameters if (p.ndim > 1) == decays]
+            groups.append(
+                {"params": chosen, "peak": settings.rate * share, "weight_decay": settings.weight_decay * decays}
+            )
+    return torch.optim.AdamW(groups, lr=settings.rate)
+
+
+def _mixed_precision() -> Any:
+    """bfloat16 where the processor computes in it, else nothing."""
+    return torch.autocast("cpu", torch.bfloat16) if torch.ops.mkldnn._is_mkldnn_bf16_supported() else nullcontext()
