@@ -16,6 +16,10 @@ class Segmenter(Protocol):
     def names(self) -> tuple[str, ...]:
         """Class names; index 0 is "void"."""
 
+    @property
+    def fingerprint(self) -> str:
+        """Text that changes with the weights and every setting that labels depend on; empty = never cache."""
+
     def segment(self, color: npt.NDArray[np.uint8], frame_index: int | None = None) -> LabelMap:
         """Label an RGB image (H, W, 3) uint8; labels come back at its full size.
 
