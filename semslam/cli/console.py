@@ -36,17 +36,19 @@ def remarks(sentences: Sequence[str], most: int = 5) -> None:
 
 
 @contextmanager
-def bar(title: str, total: int | None, unit: str = "frames") -> Iterator[Callable[[int], None]]:
-    """Show a progress bar; the function given sets how much is done."""
+def bar(title: str, total: int | None, unit: str = "frames") -> Iterator[Callable[[int, int | None], None]]:
+    """Show a progress bar; the function given sets how much is done, and of how much where that is known by now."""
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn(unit))
     with Progress(*columns, TimeElapsedColumn(), TimeRemainingColumn(), console=err, transient=True) as progress:
         task = progress.add_task(title, total=total)
-        yield lambda done: progress.update(task, completed=done)
+        yield lambda done, whole: progress.update(task, completed=done, total=whole)
 
 
-def frame_progress(update: Callable[[int], None]) -> Callable[[int, "FrameState | None"], None]:
+def frame_progress(
+    update: Callable[[int, int | None], None], frames: int
+) -> Callable[[int, "FrameState | None"], None]:
     """A run's progress callback that moves a bar."""
-    return lambda index, state: update(index + 1)
+    return lambda index, state: update(index + 1, frames)
 
 
 def metrics_table(runs: Sequence["Metrics"], title: str) -> Table:

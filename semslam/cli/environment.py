@@ -65,7 +65,7 @@ def download_command(
     from semslam.datasets.download import BASE_URL, download
 
     with bar(name, None, "bytes") as update:
-        path = download(name, directory, progress=lambda done, total: update(done), base_url=base_url or BASE_URL)
+        path = download(name, directory, progress=update, base_url=base_url or BASE_URL)
     out.print(f"Unpacked to {path}", soft_wrap=True)
 
 

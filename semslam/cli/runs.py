@@ -133,7 +133,7 @@ def _run_one(dataset: "Dataset", config: "Config", directory: Path, plots: bool)
 
     check_writable(directory)
     with bar(f"{dataset.name} {config.detector}", len(dataset)) as update:
-        result = run(dataset, config, frame_progress(update))
+        result = run(dataset, config, frame_progress(update, len(dataset)))
     remarks(result.notes)
     try:
         write_run(result, dataset, directory, plots)
