@@ -81,6 +81,27 @@ class FeatureOdometryConfig(Section):
     covariance_scale: float = Field(10.0, gt=0, description="factor that calibrates the covariance")
 
 
+class FeatureMapConfig(Section):
+    """Odometry against a map of landmarks."""
+
+    min_inliers: int = Field(15, gt=5, description="landmarks that must agree on a pose")
+    radius: float = Field(15.0, gt=0, description="pixels around a landmark's predicted place that are searched")
+    narrow_radius: float = Field(6.0, gt=0, description="the same once the pose is nearly known")
+    local_keyframes: int = Field(15, gt=0, description="covisible keyframes whose landmarks are looked for")
+    min_interval: float = Field(0.09, ge=0, description="seconds that lie between keyframes at the least")
+    max_interval: float = Field(0.33, gt=0, description="seconds after which a keyframe is made in any case")
+    max_translation: float = Field(0.1, gt=0, description="metres of motion that make one sooner")
+    max_rotation: float = Field(0.15, gt=0, description="radians of motion that make one sooner")
+    min_share: float = Field(0.5, gt=0, le=1, description="share of the keypoints that must be landmarks, or one is made")
+    min_shared: int = Field(15, gt=0, description="landmarks that make two keyframes covisible")
+    max_depth: float = Field(4.0, gt=0, description="metres; farther keypoints do not become landmarks")
+    min_found: float = Field(0.25, ge=0, le=1, description="share of its views in which a landmark must be found")
+    window: int = Field(6, gt=0, description="keyframes adjusted together")
+    fixed: int = Field(6, ge=0, description="keyframes around them that hold them in place")
+    adjustment_steps: int = Field(5, gt=0, description="steps of an adjustment, one a frame")
+    covariance_scale: float = Field(4.0, gt=0, description="factor that calibrates the covariance")
+
+
 class DenseConfig(Section):
     """Dense RGB-D odometry."""
 
@@ -273,6 +294,7 @@ class Config(Section):
     features: FeatureConfig = FeatureConfig()
     keyframes: KeyframeConfig = KeyframeConfig()
     feature: FeatureOdometryConfig = FeatureOdometryConfig()
+    feature_map: FeatureMapConfig = FeatureMapConfig()
     dense: DenseConfig = DenseConfig()
     kiss: KissConfig = KissConfig()
     segmentation: SegmentationConfig = SegmentationConfig()
