@@ -11,6 +11,8 @@ from backend.checks import checked_pose
 from backend.factors import between_factor
 from backend.products import Edge, loop_edge
 from frontend.keyframes import make_keyframe
+from loop.detector import LoopDetector
+from loop.segmentation.segmenter import Segmenter
 from loop.verification import IcpVerifier, LoopVerifier
 from semslam import plugins
 from semslam.config import Config
@@ -47,7 +49,7 @@ class LoopCloser:
 
     Args:
         intrinsics: the camera of all images.
-        detector: registered loop detector; none = the one the settings name.
+        detector: registered loop detector, or one of your own; none = the one the settings name.
         config: settings of features, keyframes, segmentation, loops and verification.
         T_body_cam: (4, 4) where the graph's poses are not the camera's: the camera in the body's frame.
         noise: makes the factor's noise model of a loop; none = the covariance from the verification.
@@ -63,7 +65,7 @@ class LoopCloser:
     def __init__(
         self,
         intrinsics: Intrinsics,
-        detector: str | None = None,
+        detector: str | LoopDetector | None = None,
         config: Config | None = None,
         *,
         T_body_cam: npt.ArrayLike | None = None,
@@ -76,8 +78,8 @@ class LoopCloser:
         self._T_body_cam = checked_pose(np.eye(4) if T_body_cam is None else T_body_cam, "The camera on the body")
         self._noise = noise
         self._kernel = kernel
-        self._detector = plugins.load("semslam.detectors", detector or self._config.detector).from_config(self._config)
-        self._segmenter = None
+        self._detector = self._chosen(detector or self._config.detector)
+        self._segmenter: Segmenter | None = None
         if self._detector.needs_labels:
             name = self._config.segmentation.name
             self._segmenter = plugins.load("semslam.segmenters", name).from_config(self._config)
@@ -86,6 +88,12 @@ class LoopCloser:
         self._keys: list[int] = []
         self._keyframes: list[Keyframe] = []
         self._closures: list[Closure] = []
+
+    def _chosen(self, detector: str | LoopDetector) -> LoopDetector:
+        if not isinstance(detector, str):
+            return detector
+        chosen: LoopDetector = plugins.load("semslam.detectors", detector).from_config(self._config)
+        return chosen
 
     @property
     def closures(self) -> tuple[Closure, ...]:
