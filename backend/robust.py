@@ -78,16 +78,14 @@ def solve_robustly(name: str, problem: RobustProblem) -> RobustSolution:
     return solution
 
 
-def least_squares(graph: gtsam.NonlinearFactorGraph, initial: gtsam.Values, max_iterations: int) -> gtsam.Values:
-    """Plain Levenberg-Marquardt."""
-    return gtsam.LevenbergMarquardtOptimizer(graph, initial, _lm_params(max_iterations)).optimize()
-
-
-def _lm_params(max_iterations: int) -> gtsam.LevenbergMarquardtParams:
+def least_squares(
+    graph: gtsam.NonlinearFactorGraph, initial: gtsam.Values, max_iterations: int, tolerance: float = 1e-6
+) -> gtsam.Values:
+    """Plain Levenberg-Marquardt, until the cost changes by less than ``tolerance`` of itself."""
     params = gtsam.LevenbergMarquardtParams()
     params.setMaxIterations(max_iterations)
-    params.setRelativeErrorTol(1e-6)
-    return params
+    params.setRelativeErrorTol(tolerance)
+    return gtsam.LevenbergMarquardtOptimizer(graph, initial, params).optimize()
 
 
 def _joined(problem: RobustProblem, kernel: Kernel | None) -> gtsam.NonlinearFactorGraph:

@@ -268,6 +268,20 @@ class VerificationConfig(Section):
     sigma_translation: float = Field(0.02, ge=0, description="metres, the same")
 
 
+class BundleConfig(Section):
+    """Bundle adjustment of keyframes and landmarks after the closures."""
+
+    rounds: int = Field(3, gt=0, description="adjustments, each without the outliers of the one before")
+    iterations: int = Field(5, gt=0, description="Levenberg-Marquardt steps of a round at the most")
+    max_observations: int = Field(250, gt=0, description="observations a keyframe needs; more are mostly left out")
+    pixel_sigma: float = Field(1.0, gt=0, description="pixels; error of a keypoint")
+    disparity_weight: float = Field(0.5, gt=0, description="weight of depth, as a virtual disparity, against a pixel")
+    baseline: float = Field(0.08, gt=0, description="metres between the virtual stereo pair's cameras")
+    outlier: float = Field(2.8, gt=0, description="whitened reprojection error at which an observation is dropped")
+    min_views: int = Field(2, gt=1, description="keyframes that must see a landmark")
+    min_observations: int = Field(20, gt=0, description="keyframes with fewer are held by odometry too")
+
+
 class BackendConfig(Section):
     """The pose graph's optimisation."""
 
@@ -282,6 +296,7 @@ class BackendConfig(Section):
     max_loop_scale: float = Field(
         3.0, ge=1, description="how far the loops' deviations may be widened where neighbouring ones disagree"
     )
+    bundle: BundleConfig = BundleConfig()
 
 
 class Config(Section):
