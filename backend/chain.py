@@ -1,6 +1,6 @@
 """What odometry alone says of two keyframes, however far apart: their relative pose and its covariance."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from itertools import pairwise
 
 import numpy as np
@@ -56,6 +56,13 @@ class OdometryChain:
         shared = self._covariance[np.minimum(rows_a, rows_b)]
         covariance = carry @ (self._covariance[np.maximum(rows_a, rows_b)] - shared) @ np.swapaxes(carry, 1, 2)
         return invert(self._T[rows_a]) @ T_b, covariance, self._chain[rows_a] == self._chain[rows_b]
+
+    def poses(self) -> Iterator[tuple[int, int, FloatArray]]:
+        """Each key, the key its chain starts with, and its pose (4, 4) in that one."""
+        starts: dict[int, int] = {}
+        for key, row in self._row.items():
+            start = starts.setdefault(int(self._chain[row]), key)
+            yield key, start, invert(self._T[self._row[start]]) @ self._T[row]
 
     def _rows(self, keys: npt.ArrayLike) -> IntArray:
         return np.array([self._row[int(key)] for key in np.asarray(keys).ravel()], dtype=np.int64)

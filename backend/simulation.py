@@ -4,7 +4,7 @@ import numpy as np
 
 from backend.products import Edge
 from semslam.geometry import exp_so3, invert, make_transform
-from semslam.types import FloatArray, LoopCandidate, LoopConstraint
+from semslam.types import FloatArray
 
 SIGMAS = np.array([0.005] * 3 + [0.01] * 3)
 """Standard deviations of a simulated measurement: radians, then metres."""
@@ -42,9 +42,3 @@ def measure_odometry(
 ) -> list[Edge]:
     """Measure each keyframe from the one before it."""
     return measure(truth, [(key, key + 1) for key in range(len(truth) - 1)], rng, scale, sigmas)
-
-
-def as_constraint(edge: Edge, detector: str = "simulated") -> LoopConstraint:
-    """An edge as the verified loop that it stands for: from match to query."""
-    candidate = LoopCandidate(edge.to_key, edge.from_key, 1.0, detector)
-    return LoopConstraint(candidate, edge.T_from_to, edge.covariance, 1.0, 0.0, 1.0, 0, detector)

@@ -5,8 +5,9 @@ import pytest
 
 from backend.calibration import loop_scale, odometry_scale
 from backend.chain import OdometryChain, adjoints, deviations, squared_mahalanobis
+from backend.judge import constraint_of
 from backend.pose_graph import Edge, PoseGraph
-from backend.simulation import as_constraint, measure, measure_odometry, ring
+from backend.simulation import measure, measure_odometry, ring
 from semslam.config import BackendConfig
 from semslam.geometry import adjoint, compose, exp_so3, invert, make_transform
 
@@ -125,7 +126,7 @@ def test_true_loops_survive_odometry_that_is_too_sure_of_itself(seed):
         for edge in edges:
             graph.add_odometry(edge.from_key, edge.to_key, edge.T_from_to, edge.covariance)
         for edge in loop_edges(truth, rng)[::2]:
-            graph.add_loop(as_constraint(edge))
+            graph.add_loop(constraint_of(edge))
         return graph.optimize()
 
     believing, widening = solve(1.0), solve(10.0)

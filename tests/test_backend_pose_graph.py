@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
+from backend.judge import constraint_of
 from backend.pose_graph import Edge, PoseGraph
 from backend.robust import STRATEGIES
-from backend.simulation import SIGMAS, as_constraint, measure_odometry, noisy, ring
+from backend.simulation import SIGMAS, measure_odometry, noisy, ring
 from semslam.config import BackendConfig
 from semslam.errors import ConfigError, GraphError
 from semslam.geometry import compose, exp_so3, invert, make_transform, rotation_angle
@@ -15,7 +16,7 @@ ROBUST = ["gnc", "dcs"]
 
 
 def make_loop(match, query, T_match_query, covariance=COVARIANCE):
-    return as_constraint(Edge(match, query, T_match_query, covariance))
+    return constraint_of(Edge(match, query, T_match_query, covariance))
 
 
 def make_graph(truth, rng, false_loops=0, config=None, scale=1.0):
