@@ -1,7 +1,7 @@
 """From a checked graph to a solution: maps placed, covariances believed or widened, loops judged."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import gtsam
 import numpy as np
@@ -71,7 +71,7 @@ def optimize_graph(problem: GraphProblem, config: BackendConfig, marginals: bool
         start.update(problem.anchored(problem.poses, component))
     start = place_components(start, maps, edges)
     odometry_factor, loop_factor = _scales(problem, edges, config)
-    loops = _widened(edges, loop_factor)
+    loops = [edge.widened(loop_factor) for edge in edges]
     trusted = _trusted(problem, maps, start, odometry_factor)
     result = solve_robustly(
         config.robust, RobustProblem(trusted, loops, make_values(start), config.max_residual, config.max_iterations)
@@ -93,18 +93,16 @@ def optimize_graph(problem: GraphProblem, config: BackendConfig, marginals: bool
         odometry_scale=odometry_factor,
         loop_scale=loop_factor,
         components=tuple(components),
-        covariances=_marginals(trusted, _widened(kept, loop_factor), result.values) if marginals else None,
+        covariances=_marginals(trusted, [edge.widened(loop_factor) for edge in kept], result.values)
+        if marginals
+        else None,
     )
 
 
 def _scales(problem: GraphProblem, loops: Sequence[Edge], config: BackendConfig) -> tuple[float, float]:
     chain = OdometryChain(problem.poses, problem.odometry)
     of_loops = loop_scale(chain, loops, config.max_loop_scale)
-    return odometry_scale(chain, _widened(loops, of_loops), config.max_odometry_scale), of_loops
-
-
-def _widened(edges: Sequence[Edge], factor: float) -> list[Edge]:
-    return [replace(edge, covariance=edge.covariance * factor**2) for edge in edges]
+    return odometry_scale(chain, [loop.widened(of_loops) for loop in loops], config.max_odometry_scale), of_loops
 
 
 def _trusted(
@@ -114,8 +112,8 @@ def _trusted(
     for index, component in enumerate(maps):
         key = problem.anchor(component)
         graph.add(prior_factor(key, start[key], FLOATING_SIGMA if index else ANCHOR_SIGMA))
-    for edge in _widened(problem.odometry, factor):
-        graph.add(between_factor(edge))
+    for edge in problem.odometry:
+        graph.add(between_factor(edge.widened(factor)))
     return graph
 
 
@@ -135,10 +133,10 @@ def _judge(
 
 
 def _marginals(
-    trusted: gtsam.NonlinearFactorGraph, kept: Sequence[Edge], values: gtsam.Values
+    trusted: gtsam.NonlinearFactorGraph, kept: Sequence[Edge], factor: float, values: gtsam.Values
 ) -> dict[int, FloatArray]:
     graph = gtsam.NonlinearFactorGraph(trusted)
     for edge in kept:
-        graph.add(between_factor(edge))
+        graph.add(between_factor(edge.widened(factor)))
     marginals = gtsam.Marginals(graph, values)
     return {key: np.asarray(marginals.marginalCovariance(key)) for key in values.keys()}  # noqa: SIM118

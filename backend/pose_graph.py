@@ -33,6 +33,10 @@ class PoseGraph:
         """The loops in the graph, in the order they were added."""
         return tuple(self._loops.values())
 
+    def start(self, key: int) -> FloatArray:
+        """The pose (4, 4) that a keyframe was given: its prior, or else what it was added with."""
+        return self._priors.get(key, self._poses[key])
+
     def add_keyframe(self, key: int, T_world_cam: npt.ArrayLike) -> None:
         """Add a keyframe with the pose (4, 4) to start from.
 
@@ -54,7 +58,7 @@ class PoseGraph:
             raise GraphError(f"Keyframe {key} has a prior already.")
         self._priors[key] = checked_pose(T_world_cam, f"The prior of keyframe {key}")
 
-    def add_odometry(self, from_key: int, to_key: int, T_from_to: npt.ArrayLike, covariance: npt.ArrayLike) -> None:
+    def add_odometry(self, from_key: int, to_key: int, T_from_to: npt.ArrayLike, covariance: npt.ArrayLike) -> Edge:
         """Join two keyframes by a trusted relative pose (4, 4) with covariance (6, 6), rotation first.
 
         Raises:
@@ -64,8 +68,9 @@ class PoseGraph:
         self._require_pair(from_key, to_key)
         if (from_key, to_key) in self._odometry:
             raise GraphError(f"{what} is in the graph already.")
-        T = checked_pose(T_from_to, what)
-        self._odometry[from_key, to_key] = Edge(from_key, to_key, T, checked_covariance(covariance, what))
+        edge = Edge(from_key, to_key, checked_pose(T_from_to, what), checked_covariance(covariance, what))
+        self._odometry[from_key, to_key] = edge
+        return edge
 
     def add_loop(self, constraint: LoopConstraint) -> None:
         """Add a loop closure, which may be false.

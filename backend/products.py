@@ -1,6 +1,6 @@
 """What the back end takes and gives back. Covariances are (6, 6), rotation first, as everywhere."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from backend.checks import checked_covariance, checked_pose
 from semslam.types import FloatArray, LoopConstraint
@@ -21,6 +21,10 @@ class Edge:
     to_key: int
     T_from_to: FloatArray
     covariance: FloatArray
+
+    def widened(self, factor: float) -> "Edge":
+        """The same measurement with ``factor`` times the standard deviations."""
+        return replace(self, covariance=self.covariance * factor**2)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
