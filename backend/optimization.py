@@ -93,9 +93,7 @@ def optimize_graph(problem: GraphProblem, config: BackendConfig, marginals: bool
         odometry_scale=odometry_factor,
         loop_scale=loop_factor,
         components=tuple(components),
-        covariances=_marginals(trusted, [edge.widened(loop_factor) for edge in kept], result.values)
-        if marginals
-        else None,
+        covariances=_marginals(trusted, kept, loop_factor, result.values) if marginals else None,
     )
 
 
