@@ -30,6 +30,11 @@ class Timeline:
         self._ids.append([keyframe.id])
         self._stamps.append([keyframe.timestamp])
 
+    @property
+    def stamps(self) -> FloatArray:
+        """Seconds (N,) of the keyframes."""
+        return self._stamps.rows
+
     def id_at(self, position: int) -> int:
         """Identity of the keyframe at a position."""
         return int(self._ids.rows[position])

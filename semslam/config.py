@@ -85,8 +85,13 @@ class FeatureMapConfig(Section):
     """Odometry against a map of landmarks."""
 
     min_inliers: int = Field(15, gt=5, description="landmarks that must agree on a pose")
+    sure_inliers: int = Field(40, gt=5, description="landmarks below which a pose is called degraded")
+    min_landmarks: int = Field(50, gt=5, description="keypoints with depth that a keyframe must have")
+    restart_seconds: float = Field(0.5, ge=0, description="a new map starts when good images meet none for so long")
+    readout: float = Field(0.026, ge=0, description="seconds from an image's first row to its last (rolling shutter)")
+    readout_sigma: float = Field(0.01, ge=0, description="its uncertainty, with which it is estimated; 0 = it is known")
     radius: float = Field(15.0, gt=0, description="pixels around a landmark's predicted place that are searched")
-    narrow_radius: float = Field(6.0, gt=0, description="the same once the pose is nearly known")
+    narrow_radius: float = Field(10.0, gt=0, description="the same once the pose is nearly known")
     local_keyframes: int = Field(15, gt=0, description="covisible keyframes whose landmarks are looked for")
     min_interval: float = Field(0.09, ge=0, description="seconds that lie between keyframes at the least")
     max_interval: float = Field(0.33, gt=0, description="seconds after which a keyframe is made in any case")
@@ -150,6 +155,7 @@ class TrainingConfig(Section):
     rate: float = Field(1e-3, gt=0, description="peak learning rate of decoder and head")
     encoder_rate: float = Field(0.25, ge=0, description="learning rate of the encoder as a share of the peak")
     weight_decay: float = Field(0.02, ge=0, description="decoupled weight decay")
+    freeze_early: bool = Field(False, description="leave the encoder's stem and first blocks, to 1/4, as they are")
     warmup: float = Field(0.08, ge=0, lt=1, description="share of the steps in which the rate climbs")
     average: float = Field(0.998, ge=0, lt=1, description="decay of the weight average that is kept")
     pseudo: tuple[Path, ...] = Field((), description="more folders of photos whose labels a teacher made")
@@ -246,6 +252,19 @@ class PaperSemanticConfig(SemanticConfig):
     min_node_share: float = Field(0.75, ge=0, le=1, description="share of similar nodes, formula (3)")
 
 
+class DbowConfig(Section):
+    """Bags of binary words."""
+
+    group: float = Field(0.35, ge=0, description="seconds; keyframes this near are scored together")
+    min_score: float = Field(0.05, ge=0, le=1, description="score of a candidate")
+
+
+class Conv3Config(Section):
+    """Flattened convolutional features."""
+
+    alexnet: Path | None = Field(None, description="torchvision's AlexNet weights; none = the shipped encoder")
+
+
 class VerificationConfig(Section):
     """Gates between a candidate and a constraint."""
 
@@ -256,7 +275,7 @@ class VerificationConfig(Section):
     icp_distances: tuple[float, ...] = Field((0.1, 0.05), description="metres, correspondence limit of each ICP pass")
     max_shift: float = Field(20.0, gt=0, description="pixels, median, by which ICP may move the agreeing matches")
     fit_distance: float = Field(0.05, gt=0, description="metres within which a point meets the other surface")
-    min_fitness: float = Field(0.25, ge=0, le=1, description="share of the query's points that meet the match's surface")
+    min_fitness: float = Field(0.25, ge=0, le=1, description="share of the query's points on the match's surface")
     max_rmse: float = Field(0.035, gt=0, description="metres, over those points")
     overlap_distance: float = Field(0.1, gt=0, description="metres within which a point counts as seen by the other")
     min_overlap: float = Field(0.15, ge=0, le=1, description="share of either view that the other must see")
@@ -317,6 +336,8 @@ class Config(Section):
     loops: LoopConfig = LoopConfig()
     semantic: SemanticConfig = SemanticConfig()
     semantic_paper: PaperSemanticConfig = PaperSemanticConfig()
+    dbow: DbowConfig = DbowConfig()
+    conv3: Conv3Config = Conv3Config()
     verification: VerificationConfig = VerificationConfig()
     backend: BackendConfig = BackendConfig()
     plugins: dict[str, dict[str, Any]] = Field({}, description="settings of outside plug-ins, by plug-in name")

@@ -23,6 +23,11 @@ DETECTORS: dict[str, str] = {
     "none": "loop.detector:NoLoops",
     "semantic": "loop.semantic:SemanticDetector",
     "semantic-paper": "loop.semantic:PaperSemanticDetector",
+    "dbow": "loop.dbow:DbowDetector",
+    "conv3": "loop.conv3:Conv3Detector",
+    "thumbnail": "loop.thumbnail:ThumbnailDetector",
+    "hog": "loop.hog:HogDetector",
+    "gist": "loop.gist:GistDetector",
 }
 SEGMENTERS: dict[str, str] = {
     "onnx": "loop.segmentation.onnx:OnnxSegmenter",

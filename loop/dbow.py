@@ -1,0 +1,109 @@
+"""Bags of binary words (Gálvez-López and Tardós, T-RO 2012)."""
+
+from typing import Self
+
+import numpy as np
+
+from loop.growing import GrowingArray
+from loop.memo import LastView
+from loop.timeline import Timeline
+from loop.vocabulary import Vocabulary, load_vocabulary
+from semslam.config import Config, DbowConfig, LoopConfig
+from semslam.types import Float32Array, FloatArray, IntArray, KeyframeView, LoopCandidate, LoopEvidence
+
+Bag = tuple[IntArray, Float32Array]
+"""Words of an image, ascending, and their tf-idf weights, which add up to one."""
+
+
+class WordIndex:
+    """The inverted file: for each word the images that hold it, and with which weight."""
+
+    def __init__(self) -> None:
+        self._images: dict[int, GrowingArray[np.int64]] = {}
+        self._weights: dict[int, GrowingArray[np.float32]] = {}
+        self._count = 0
+
+    def add(self, bag: Bag) -> None:
+        """Enter the next image."""
+        for word, weight in zip(bag[0].tolist(), bag[1], strict=True):
+            if word not in self._images:
+                self._images[word], self._weights[word] = GrowingArray(np.int64), GrowingArray(np.float32)
+            self._images[word].append([self._count])
+            self._weights[word].append([weight])
+        self._count += 1
+
+    def scores(self, bag: Bag) -> FloatArray:
+        """L1 score (N,) in 0..1 with each image: 1 - |v - w| / 2, which is the sum of the smaller weights."""
+        shared = [(word, weight) for word, weight in zip(bag[0].tolist(), bag[1], strict=True) if word in self._images]
+        if not shared:
+            return np.zeros(self._count)
+        images = np.concatenate([self._images[word].rows for word, _ in shared])
+        theirs = np.concatenate([self._weights[word].rows for word, _ in shared])
+        ours = np.repeat([weight for _, weight in shared], [len(self._images[word]) for word, _ in shared])
+        smaller = np.minimum(ours, theirs).astype(np.float64)
+        return np.asarray(np.bincount(images, smaller, self._count), dtype=np.float64)
+
+
+class DbowDetector:
+    """Vocabulary tree, tf-idf, L1 score, inverted file, temporal grouping.
+
+    Images that follow each other within ``group`` seconds are grouped: the score with a keyframe is the mean over
+    the keyframes around it, so that one lucky picture does not make a loop. The original divides by the score with
+    the picture before; that is left out, as it sinks recall where keyframes overlap unevenly.
+    """
+
+    name = "dbow"
+    needs_labels = False
+
+    def __init__(self, vocabulary: Vocabulary, config: DbowConfig, loops: LoopConfig) -> None:
+        self._vocabulary = vocabulary
+        self._group = config.group
+        self._timeline = Timeline(loops, config.min_score)
+        self._index = WordIndex()
+        self._bag = LastView(lambda view: make_bag(vocabulary, view))
+
+    @classmethod
+    def from_config(cls, config: Config) -> Self:
+        """Take the sections ``dbow`` and ``loops``.
+
+        Raises:
+            ModelError: the shipped vocabulary is missing or damaged.
+        """
+        return cls(load_vocabulary(), config.dbow, config.loops)
+
+    def query(self, view: KeyframeView) -> list[LoopCandidate]:
+        """Candidates by grouped score."""
+        if not len(self._timeline):
+            return []
+        alone = self._index.scores(self._bag(view))
+        scores = grouped(alone, self._timeline.stamps, self._group)
+        return [
+            LoopCandidate(
+                view.keyframe.id, self._timeline.id_at(at), float(scores[at]), self.name,
+                LoopEvidence(figures={"words": float(alone[at]), "grouped": float(scores[at])}),
+            )
+            for at in self._timeline.best(view.keyframe, scores)
+        ]  # fmt: skip
+
+    def add(self, view: KeyframeView) -> None:
+        """Remember the view's words."""
+        self._index.add(self._bag(view))
+        self._timeline.add(view.keyframe)
+
+
+def make_bag(vocabulary: Vocabulary, view: KeyframeView) -> Bag:
+    """The view's words with their tf-idf weights."""
+    words, counts = np.unique(vocabulary.words(view.keyframe.features.descriptors), return_counts=True)
+    weights = counts * vocabulary.weights[words]
+    used = weights > 0
+    weights = weights[used]
+    return words[used], (weights / max(float(weights.sum()), 1e-12)).astype(np.float32)
+
+
+def grouped(scores: FloatArray, stamps: FloatArray, window: float) -> FloatArray:
+    """Mean of the scores (N,) over the entries within ``window`` seconds of each; stamps (N,) ascend."""
+    first = np.searchsorted(stamps, stamps - window - 1e-6)
+    last = np.searchsorted(stamps, stamps + window + 1e-6)
+    sums = np.concatenate([[0.0], np.cumsum(scores)])
+    means: FloatArray = np.clip((sums[last] - sums[first]) / np.maximum(last - first, 1), 0.0, 1.0)
+    return means
