@@ -8,6 +8,7 @@ from semslam.geometry import Float32Array, FloatArray
 
 GREY = (127, 127, 127)
 STRONG_ROTATION = 45.0
+CLOSE, TURNED = 0.15, 0.25
 HALF = 0.6
 
 
@@ -36,11 +37,16 @@ def random_view(photo: Photo, width: int, height: int, rng: np.random.Generator)
 def _placement(
     inside_width: int, inside_height: int, width: int, height: int, rng: np.random.Generator
 ) -> tuple[FloatArray, float]:
-    """Affine map (2, 3) from photo to view, and view pixels per photo pixel."""
+    """Affine map (2, 3) from photo to view, and view pixels per photo pixel.
+
+    Half of the views are near to how the photo was taken; the others are taken closer, as over a tabletop, or
+    turned.
+    """
     fit = min(width / inside_width, height / inside_height)
-    close_up = rng.random() < 0.15  # as over a tabletop
-    zoom = rng.uniform(1.6, 3.3) if close_up else np.exp(rng.uniform(np.log(0.75), np.log(1.7)))
-    spread = STRONG_ROTATION if rng.random() < 0.25 else 8.0
+    kind = rng.random()
+    low, high = (1.6, 3.3) if kind < CLOSE else (0.8, 1.7) if kind < CLOSE + TURNED else (0.95, 1.5)
+    zoom = np.exp(rng.uniform(np.log(low), np.log(high)))
+    spread = STRONG_ROTATION if CLOSE / 2 <= kind < CLOSE + TURNED else 6.0
     angle = np.deg2rad(rng.uniform(-spread, spread))
     mirror = -1.0 if rng.random() < 0.5 else 1.0
     scale = fit * zoom
@@ -56,7 +62,7 @@ def _placement(
 
 def _relight(image: Float32Array, rng: np.random.Generator) -> Float32Array:
     """Exposure, gamma, contrast, white balance and saturation."""
-    if rng.random() < 0.8:
+    if rng.random() < 0.6:
         image = image * np.exp(rng.uniform(-0.5, 0.4)).astype(np.float32)
         image = image * np.exp(rng.normal(0.0, 0.08, 3)).astype(np.float32)
     if rng.random() < 0.5:

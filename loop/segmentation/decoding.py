@@ -50,10 +50,12 @@ def decode(logits: Float32Array, size: tuple[int, int], min_confidence: float = 
     width, height = logits.shape[2] * 4, logits.shape[1] * 4
     best = cv2.resize(logits[0], (width, height))
     labels = np.ones((height, width), dtype=np.uint8)
+    stamp = np.empty_like(labels)
     # Plane by plane all stays in the processor's cache: five times faster than an argmax over the stack.
     for label, plane in enumerate(logits[1:], start=2):
         enlarged = cv2.resize(plane, (width, height))
-        labels[cv2.compare(enlarged, best, cv2.CMP_GT) > 0] = label
+        stamp[:] = label
+        cv2.copyTo(stamp, cv2.compare(enlarged, best, cv2.CMP_GT), labels)
         cv2.max(enlarged, best, dst=best)
     top = logits.max(axis=0)
     coarse = 1.0 / np.exp(logits - top).sum(axis=0)

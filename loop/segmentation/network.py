@@ -83,7 +83,19 @@ class InvertedResidual(nn.Module):
         return (x + out if self.residual else out), filtered
 
 
-class MobileNetV2(nn.Module):
+class Encoder(nn.Module):
+    """Base of the encoders: names the channels of its ``Encoding``, and its layers down to a quarter."""
+
+    low_channels: int
+    middle_channels: int
+    high_channels: int
+
+    def early_layers(self) -> list[nn.Module]:
+        """The layers at half and a quarter of the image's size, which see edges and colours alone."""
+        raise NotImplementedError
+
+
+class MobileNetV2(Encoder):
     """The encoder at output stride 16; its low-level features are block 3's expanded ones at stride 4."""
 
     low_channels, middle_channels, high_channels = 144, 96, 320
@@ -98,6 +110,10 @@ class MobileNetV2(nn.Module):
                 blocks.append(InvertedResidual(inside, out, expansion, first_stride if i == 0 else 1, dilation))
                 inside = out
         self.blocks = nn.ModuleList(blocks)
+
+    def early_layers(self) -> list[nn.Module]:
+        """The stem and the first three blocks."""
+        return [self.stem, *self.blocks[: LOW_LEVEL_BLOCK + 1]]
 
     def forward(self, x: Tensor) -> Encoding:
         """Encode images (B, 3, H, W)."""
@@ -139,11 +155,11 @@ class DeepLab(nn.Module):
         dropout: share of channels dropped before the classifier in training.
     """
 
-    def __init__(self, encoder: nn.Module, classes: int = 40, dropout: float = 0.1) -> None:
+    def __init__(self, encoder: Encoder, classes: int = 40, dropout: float = 0.1) -> None:
         super().__init__()
         self.encoder = encoder
-        self.aspp = AtrousPyramid(int(encoder.high_channels))  # type: ignore[arg-type]
-        self.low = ConvNorm(int(encoder.low_channels), LOW_CHANNELS)  # type: ignore[arg-type]
+        self.aspp = AtrousPyramid(encoder.high_channels)
+        self.low = ConvNorm(encoder.low_channels, LOW_CHANNELS)
         self.decoder = nn.Sequential(
             SeparableConv(ASPP_CHANNELS + LOW_CHANNELS, ASPP_CHANNELS), SeparableConv(ASPP_CHANNELS, ASPP_CHANNELS)
         )

@@ -1,6 +1,5 @@
 """Training on NYUv2-layout folders: resumable at any moment, and the same views for the same seed."""
 
-import csv
 import time
 from collections.abc import Callable
 from contextlib import nullcontext
@@ -16,22 +15,25 @@ from torch import Tensor
 from loop.segmentation.augmentation import random_view
 from loop.segmentation.checkpoint import load_weights, read_tensors, save_atomically, save_weights
 from loop.segmentation.classes import CLASS_COUNT
-from loop.segmentation.fast_layers import enlarge
+from loop.segmentation.decoding import input_size, shrink
+from loop.segmentation.export import write_int8
 from loop.segmentation.network import DeepLab, build_mobilenet_deeplab
 from loop.segmentation.photos import Photo, read_photos
 from loop.segmentation.pretrained import convert_ade20k, refresh_norms
+from loop.segmentation.training_log import plot_log, write_row
 from semslam.config import Config, TrainingConfig
 from semslam.errors import ModelError
 
-LOSS_STRIDE = 2
+LOSS_STRIDE = 4
 LOG_STEPS = 20
+CALIBRATION_STRIDE = 6
 NORM_IMAGES = 16
 WEIGHT_LIMITS = (0.3, 4.0)
 
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """How far a training is: steps done and in all, and the recent mean loss."""
+    """How far a training is: steps done and in all, and the last step's loss."""
 
     step: int
     steps: int
@@ -39,36 +41,44 @@ class Progress:
 
 
 def train(directory: Path, config: Config, out: Path, report: Callable[[Progress], None] = lambda _: None) -> Path:
-    """Train the network on ``directory/train.txt``; starts again where a killed run left off.
+    """Train the network on ``directory/train.txt``; goes on where a killed run left off.
 
     Writes in ``out``: ``state.pt`` (to resume), ``training.csv`` (step, rate, loss) and ``weights.pt`` (float16
-    average of the weights, current at every save).
+    average of the weights), all current at every save; at the end ``weights.onnx`` (int8, calibrated on photos of
+    the training part) and ``training.png`` (the log as a curve). Both kinds of weights do as the setting
+    ``segmentation.weights``.
+
+    Args:
+        directory: in the NYUv2 layout.
+        config: its sections ``training`` and ``segmentation`` (size of the views) and its seed count.
+        out: folder of this training alone.
+        report: called after each step.
 
     Returns:
-        The path of the weights.
+        The path of the float16 weights.
 
     Raises:
         DatasetError: the folder is not in the NYUv2 layout.
         ModelError: the starting weights or the state to resume do not fit.
+        ConfigError: the input size does not fit the network.
     """
     torch.set_num_threads(config.training.threads)
     run = _Run(directory, config, out)
     run.resume()
     while run.step < run.steps:
-        run.advance()
+        report(Progress(run.step + 1, run.steps, run.advance()))
         if run.step % LOG_STEPS == 0:
-            report(Progress(run.step, run.steps, run.log()))
+            run.log()
         if run.save_is_due():
             run.save()
-    run.save()
-    return run.out / "weights.pt"
+    return run.finish()
 
 
 def class_weights(photos: list[Photo]) -> Tensor:
-    """Weights (40,) that fall with the square root of a class's share of pixels, clipped, mean 1."""
+    """Weights (40,) that fall with the square root of a class's share of pixels, clipped, median 1."""
     counts = np.sum([np.bincount(p.labels.ravel(), minlength=CLASS_COUNT + 1)[1:] for p in photos], axis=0)
     weights = 1.0 / np.sqrt(np.maximum(counts / counts.sum(), 1e-4))
-    weights = weights / np.median(weights)
+    weights = weights / np.median(weights[counts > 0])
     return torch.tensor(np.clip(weights, *WEIGHT_LIMITS), dtype=torch.float32)
 
 
@@ -86,7 +96,7 @@ class _Run:
     def __init__(self, directory: Path, config: Config, out: Path) -> None:
         settings = self.settings = config.training
         self.seed, self.out = config.seed, out
-        self.size = (config.segmentation.width, config.segmentation.height)
+        self.size = input_size(config.segmentation)
         self.photos = read_photos(directory, "train.txt")
         self.pseudo = [p for folder in settings.pseudo for p in read_photos(folder, "train.txt")]
         self.steps = max(1, settings.epochs * len(self.photos) // settings.batch)
@@ -97,6 +107,9 @@ class _Run:
         if settings.start is not None:
             self._start_from(settings.start)
         self.network.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+        self.frozen = self.network.encoder.early_layers() if settings.freeze_early else []
+        for layer in self.frozen:
+            layer.requires_grad_(False)
         self.average = {k: v.detach().clone() for k, v in self.network.state_dict().items()}
         self.optimizer = _optimizer(self.network, settings)
         self.losses: list[float] = []
@@ -121,19 +134,20 @@ class _Run:
         images = torch.from_numpy(np.stack(views)).permute(0, 3, 1, 2).float() / 127.5 - 1.0
         return images, torch.from_numpy(np.stack(labels).astype(np.int64)) - 1
 
-    def advance(self) -> None:
-        """One step of the optimiser; its views depend on seed and step alone."""
+    def advance(self) -> float:
+        """One step of the optimiser, whose views depend on seed and step alone; returns its loss."""
         share = learning_rate(self.step, self.steps, self.settings.warmup)
         for group in self.optimizer.param_groups:
             group["lr"] = group["peak"] * share
         torch.manual_seed(self.seed * 1_000_003 + self.step)
         images, labels = self._batch(np.random.default_rng((self.seed, 1, self.step)), self.settings.batch)
         self.network.train()
+        for layer in self.frozen:
+            layer.eval()
         with _mixed_precision():
             logits, _ = self.network(images.contiguous(memory_format=torch.channels_last))
         target = labels[:, LOSS_STRIDE // 2 :: LOSS_STRIDE, LOSS_STRIDE // 2 :: LOSS_STRIDE]
-        logits = enlarge(logits.float(), 4 // LOSS_STRIDE)
-        loss = F.cross_entropy(logits, target, weight=self.weights, ignore_index=-1)
+        loss = F.cross_entropy(logits.float(), target, weight=self.weights, ignore_index=-1)
         self.optimizer.zero_grad(set_to_none=True)
         loss.backward()  # type: ignore[no-untyped-call]
         torch.nn.utils.clip_grad_norm_(self.network.parameters(), 5.0)
@@ -141,6 +155,7 @@ class _Run:
         self.step += 1
         self._move_average()
         self.losses.append(loss.item())
+        return self.losses[-1]
 
     @torch.no_grad()
     def _move_average(self) -> None:
@@ -152,18 +167,10 @@ class _Run:
             else:
                 self.average[name].copy_(value)
 
-    def log(self) -> float:
-        """Append the mean loss since the last call to the log, and return it."""
+    def log(self) -> None:
+        """Append the mean loss since the last call to the log."""
         loss, self.losses = float(np.mean(self.losses)), []
-        path = self.out / "training.csv"
-        path.parent.mkdir(parents=True, exist_ok=True)
-        fresh = not path.exists()
-        with path.open("a", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file)
-            if fresh:
-                writer.writerow(["step", "rate", "loss"])
-            writer.writerow([self.step, f"{self.optimizer.param_groups[0]['lr']:.3e}", f"{loss:.4f}"])
-        return loss
+        write_row(self.out / "training.csv", self.step, self.optimizer.param_groups[-1]["lr"], loss)
 
     def save_is_due(self) -> bool:
         return time.monotonic() - self.saved_at > self.settings.save_every
@@ -175,10 +182,22 @@ class _Run:
             "optimizer": self.optimizer.state_dict(),
         }  # fmt: skip
         save_atomically(state, self.out / "state.pt")
-        averaged = build_mobilenet_deeplab()
-        averaged.load_state_dict(self.average)
-        save_weights(averaged, self.out / "weights.pt")
+        save_weights(self._averaged(), self.out / "weights.pt")
         self.saved_at = time.monotonic()
+
+    def _averaged(self) -> DeepLab:
+        network = build_mobilenet_deeplab()
+        network.load_state_dict(self.average)
+        return network
+
+    def finish(self) -> Path:
+        """Save all, and write what is made once: the int8 graph and the curve."""
+        self.save()
+        photos = (shrink(photo.color, self.size) for photo in self.photos[::CALIBRATION_STRIDE])
+        write_int8(self._averaged(), self.out / "weights.onnx", photos)
+        if (self.out / "training.csv").exists():
+            plot_log(self.out / "training.csv", self.out / "training.png")
+        return self.out / "weights.pt"
 
     def resume(self) -> None:
         """Take up the state of a killed run, if there is one."""
@@ -203,7 +222,7 @@ def _optimizer(network: DeepLab, settings: TrainingConfig) -> torch.optim.AdamW:
         inside = {id(p) for p in network.encoder.parameters()}
         parameters = [p for p in network.parameters() if (id(p) in inside) == (part is not None)]
         for decays in (True, False):
-            chosen = [p for p in parameters if (p.ndim > 1) == decays]
+            chosen = [p for p in parameters if (p.ndim > 1) == decays and p.requires_grad]
             groups.append(
                 {"params": chosen, "peak": settings.rate * share, "weight_decay": settings.weight_decay * decays}
             )
