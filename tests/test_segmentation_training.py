@@ -1,0 +1,177 @@
+"""Training on a tiny made-up folder: it learns, survives a kill, and scores are right."""
+
+import cv2
+import numpy as np
+import pytest
+import torch
+
+from loop.segmentation.augmentation import random_view
+from loop.segmentation.build import build_segmenter
+from loop.segmentation.checkpoint import SHIPPED, read_tensors
+from loop.segmentation.evaluation import confusion_matrix, evaluate, score
+from loop.segmentation.onnx import load_graph
+from loop.segmentation.photos import Photo, read_photo, read_photos
+from loop.segmentation.self_training import Teacher, label_folder
+from loop.segmentation.training import class_weights, learning_rate, train
+from loop.segmentation.training_log import read_log
+from semslam.config import load_config
+from semslam.errors import DatasetError, ModelError
+
+SIZE = {"width": 64, "height": 48}
+
+
+@pytest.fixture
+def rooms(tmp_path):
+    """Six photos with a grey wall (1) above a brown floor (2)."""
+    folder = tmp_path / "rooms"
+    for part in ("rgb", "labels40"):
+        (folder / part).mkdir(parents=True)
+    rng = np.random.default_rng(0)
+    for i in range(6):
+        horizon = int(rng.integers(30, 70))
+        labels = np.where(np.arange(96)[:, None] < horizon, 1, 2).repeat(128, 1).astype(np.uint8)
+        color = np.where(labels[..., None] == 1, (200, 200, 200), (40, 80, 140)) + rng.integers(-20, 20, (96, 128, 3))
+        cv2.imwrite(str(folder / "rgb" / f"{i}.png"), color.astype(np.uint8))
+        cv2.imwrite(str(folder / "labels40" / f"{i}.png"), labels)
+    (folder / "train.txt").write_text("0\n1\n2\n3\n")
+    (folder / "val.txt").write_text("4\n5\n")
+    return folder
+
+
+def settings(**training):
+    values = {"epochs": 2, "batch": 2, "save_every": 1e-9, "average": 0.5, **training}
+    return load_config(overrides={"training": values, "segmentation": SIZE})
+
+
+class KilledError(Exception):
+    pass
+
+
+def kill_at_third(progress):
+    if progress.step == 3:
+        raise KilledError
+
+
+def test_resumed_training_ends_with_the_same_weights(rooms, tmp_path):
+    whole = read_tensors(train(rooms, settings(), tmp_path / "whole"))
+
+    with pytest.raises(KilledError):
+        train(rooms, settings(), tmp_path / "torn", kill_at_third)
+    steps = []
+    torn = read_tensors(train(rooms, settings(), tmp_path / "torn", lambda p: steps.append(p.step)))
+    assert steps == [3, 4]
+    assert all(torch.equal(whole[name], torn[name]) for name in whole)
+
+
+def test_training_learns_and_its_outputs_serve(rooms, tmp_path):
+    losses = []
+    out = tmp_path / "run"
+    weights = train(rooms, settings(epochs=10, start=str(SHIPPED)), out, lambda p: losses.append(p.loss))
+    assert np.mean(losses[-4:]) < 0.7 * np.mean(losses[:4])
+    assert [row[0] for row in read_log(out / "training.csv")] == [20]
+    assert (out / "training.png").stat().st_size > 1000
+    for path in (weights, out / "weights.onnx"):
+        config = load_config(overrides={"segmentation": {**SIZE, "weights": str(path)}})
+        result = evaluate(build_segmenter(config), rooms, size=None)
+        assert result.pixel_accuracy > 0.8
+        assert result.per_class_iou["chair"] is None
+
+
+def test_damaged_state_is_one_sentence(rooms, tmp_path):
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "state.pt").write_bytes(b"torn")
+    with pytest.raises(ModelError, match="state"):
+        train(rooms, settings(), tmp_path / "run")
+
+
+def test_other_settings_do_not_resume(rooms, tmp_path):
+    with pytest.raises(KilledError):
+        train(rooms, settings(), tmp_path / "run", kill_at_third)
+    with pytest.raises(ModelError, match="other settings"):
+        train(rooms, settings(epochs=3), tmp_path / "run")
+
+
+def test_teacher_labels_train_on(rooms, tmp_path):
+    teacher = Teacher([load_graph(None, "int8")], sizes=((64, 48), (96, 64)))
+    probabilities = teacher.probabilities(read_photo(rooms, "0").color)
+    assert probabilities.shape == (16, 24, 40)
+    np.testing.assert_allclose(probabilities.sum(axis=2), 1.0, atol=1e-5)
+    label_folder(teacher, rooms / "rgb", tmp_path / "pseudo", min_confidence=0.2)
+    photos = read_photos(tmp_path / "pseudo", "train.txt")
+    assert len(photos) == 6
+    assert all((photo.labels == teacher.label(photo.color, 0.2)).all() for photo in photos)
+    assert train(rooms, settings(epochs=1, pseudo=[str(tmp_path / "pseudo")]), tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize(
+    ("damage", "word"),
+    [
+        (lambda d: (d / "train.txt").unlink(), "no list"),
+        (lambda d: (d / "train.txt").write_text(""), "empty"),
+        (lambda d: (d / "rgb" / "1.png").unlink(), "missing"),
+        (lambda d: (d / "labels40" / "1.png").write_bytes(b"torn"), "missing or not"),
+        (lambda d: cv2.imwrite(str(d / "labels40" / "1.png"), np.zeros((5, 5), np.uint8)), "another size"),
+        (lambda d: cv2.imwrite(str(d / "labels40" / "1.png"), np.full((96, 128), 41, np.uint8)), "beyond 40"),
+    ],
+)
+def test_faulty_folder_is_one_sentence(rooms, tmp_path, damage, word):
+    damage(rooms)
+    with pytest.raises(DatasetError, match=word):
+        train(rooms, settings(), tmp_path / "run")
+
+
+def test_views_are_drawn_from_the_seed(rooms):
+    photo = read_photo(rooms, "0")
+    a, b, c = (random_view(photo, 64, 48, np.random.default_rng(seed)) for seed in (1, 1, 2))
+    assert np.array_equal(a[0], b[0])
+    assert np.array_equal(a[1], b[1])
+    assert not np.array_equal(a[0], c[0])
+
+
+def test_views_keep_labels_on_their_pixels():
+    """Where the view shows bright it must say 2, where dark 1, whatever the zoom, turn and mirroring."""
+    labels = np.ones((96, 128), np.uint8)
+    labels[:, 64:] = 2
+    color = np.where(labels[..., None] == 2, 230, 20).repeat(3, 2).astype(np.uint8)
+    for seed in range(40):
+        view, drawn = random_view(Photo("x", color, labels), 64, 48, np.random.default_rng(seed))
+        assert view.shape == (48, 64, 3)
+        inner = cv2.erode((drawn == 2).astype(np.uint8), np.ones((15, 15))) > 0
+        outer = cv2.erode((drawn == 1).astype(np.uint8), np.ones((15, 15))) > 0
+        if inner.any() and outer.any():
+            assert view[inner].mean() > view[outer].mean() + 40
+
+
+def test_rare_classes_weigh_more():
+    labels = np.ones((10, 10), np.uint8)
+    labels[0, :4] = 5
+    labels[1, :9] = 2
+    weights = class_weights([Photo("x", np.zeros((10, 10, 3), np.uint8), labels)])
+    assert weights.shape == (40,)
+    assert weights[4] > weights[0]
+
+
+def test_learning_rate_climbs_then_falls():
+    rates = [learning_rate(step, 100, 0.1) for step in range(100)]
+    assert np.argmax(rates) in (9, 10)
+    assert rates[0] == pytest.approx(0.1)
+    assert rates[-1] < 0.01
+
+
+def test_scores_of_a_case_done_by_hand():
+    truth = np.array([[1, 1, 1, 2], [2, 2, 0, 0]], np.uint8)
+    given = np.array([[1, 1, 2, 2], [2, 3, 1, 1]], np.uint8)
+    result = score(confusion_matrix(truth, given))
+    assert result.per_class_iou["wall"] == pytest.approx(2 / 3)
+    assert result.per_class_iou["floor"] == pytest.approx(2 / 4)
+    assert result.per_class_iou["cabinet"] is None
+    assert result.miou == pytest.approx((2 / 3 + 2 / 4) / 2)
+    assert result.pixel_accuracy == pytest.approx(4 / 6)
+    assert result.mean_class_accuracy == pytest.approx(2 / 3)
+
+
+def test_shipped_network_meets_its_model_card(shared):
+    directory = shared / "data" / "nyuv2"
+    result = evaluate(build_segmenter(load_config()), directory)
+    assert result.miou > 0.25
+    assert result.pixel_accuracy > 0.6
