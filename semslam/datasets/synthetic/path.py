@@ -1,0 +1,104 @@
+"""The camera's way: a smooth walk past all stops, with the sway of a hand, and part of it a second time."""
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from semslam.datasets.synthetic.scene import Scene, Stop
+from semslam.geometry import FloatArray
+
+SPEED = 0.55
+"""Metres a second."""
+TURN = 38.0
+"""Degrees a second."""
+HEIGHT = 1.35
+"""Metres of the camera above the floor."""
+SWAY = np.array([0.012, 0.012, 0.010, 0.8, 0.7, 1.0])
+"""Size of the sway along x, y, z in metres and in yaw, pitch, roll in degrees."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Walk:
+    """Where the camera is over time.
+
+    Attributes:
+        timestamps: (N,) seconds from 0.
+        poses: (N, 4, 4) T_world_cam; the world's z points up.
+        second: (N,) whether the frame belongs to the second pass.
+    """
+
+    timestamps: FloatArray
+    poses: FloatArray
+    second: npt.NDArray[np.bool_]
+
+
+def walk(scene: Scene, rate: float, seed: int, offset: float = 0.0) -> Walk:
+    """Walk through a scene.
+
+    Args:
+        scene: gives the stops.
+        rate: frames a second.
+        seed: of the sway.
+        offset: metres by which the second pass keeps to the right of the first.
+    """
+    turn = round((scene.first_pass[-1].yaw - scene.first_pass[0].yaw) / 360.0) * 360.0
+    again = [replace(stop, yaw=stop.yaw + turn) for stop in scene.first_pass[1 : scene.second_pass]]
+    stops = [*scene.first_pass, *again]
+    knots = _times(stops)
+    returned = knots[len(scene.first_pass) - 1]
+    times = np.arange(0.0, knots[-1], 1.0 / rate)
+    tracks = _smooth(knots, np.array([[s.x, s.y, HEIGHT, s.yaw, s.pitch, 0.0] for s in stops]), times)
+    tracks += _sway(times, seed)
+    ahead = np.radians(tracks[:, 3])
+    shift = offset * np.clip((times - returned) / 2.0, 0.0, 1.0)
+    tracks[:, 0] += shift * np.sin(ahead)
+    tracks[:, 1] -= shift * np.cos(ahead)
+    return Walk(times, _poses(tracks), times >= returned)
+
+
+def _times(stops: Sequence[Stop]) -> FloatArray:
+    """Seconds at which each stop is passed."""
+    steps = [
+        max(float(np.hypot(b.x - a.x, b.y - a.y)) / SPEED, abs(b.yaw - a.yaw) / TURN, 0.4)
+        for a, b in itertools.pairwise(stops)
+    ]
+    return np.concatenate([[0.0], np.cumsum(steps)])
+
+
+def _smooth(knots: FloatArray, values: FloatArray, times: FloatArray) -> FloatArray:
+    """Cubic Hermite curve through (K, D) values, at rest at both ends."""
+    slopes = np.zeros_like(values)
+    slopes[1:-1] = (values[2:] - values[:-2]) / (knots[2:] - knots[:-2])[:, None]
+    k = np.clip(np.searchsorted(knots, times, side="right") - 1, 0, len(knots) - 2)
+    span = (knots[k + 1] - knots[k])[:, None]
+    s = (times - knots[k])[:, None] / span
+    return np.asarray(
+        (1 + 2 * s) * (1 - s) ** 2 * values[k] + s * (1 - s) ** 2 * span * slopes[k]
+        + s**2 * (3 - 2 * s) * values[k + 1] - s**2 * (1 - s) * span * slopes[k + 1]
+    )  # fmt: skip
+
+
+def _sway(times: FloatArray, seed: int) -> FloatArray:
+    """A few slow waves in each of the six tracks, (N, 6)."""
+    rng = np.random.default_rng([seed, 1])
+    frequencies, phases = rng.uniform(0.2, 1.3, (6, 4)), rng.uniform(0, 2 * np.pi, (6, 4))
+    waves = np.sin(2 * np.pi * times[:, None, None] * frequencies + phases).sum(2) / 2
+    return np.asarray(waves * SWAY)
+
+
+def _poses(tracks: FloatArray) -> FloatArray:
+    """Camera poses of tracks (N, 6): x, y, z, yaw, pitch, roll; z ahead, y down."""
+    yaw, pitch, roll = np.radians(tracks[:, 3:]).T
+    ahead = np.stack([np.cos(yaw) * np.cos(pitch), np.sin(yaw) * np.cos(pitch), np.sin(pitch)], 1)
+    level = np.stack([np.sin(yaw), -np.cos(yaw), np.zeros_like(yaw)], 1)
+    down = np.cross(ahead, level)
+    c, s = np.cos(roll)[:, None], np.sin(roll)[:, None]
+    poses = np.tile(np.eye(4), (len(tracks), 1, 1))
+    poses[:, :3, 0] = c * level + s * down
+    poses[:, :3, 1] = c * down - s * level
+    poses[:, :3, 2] = ahead
+    poses[:, :3, 3] = tracks[:, :3]
+    return poses

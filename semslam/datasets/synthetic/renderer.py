@@ -1,0 +1,167 @@
+"""Ray casting of a scene into colour, exact depth and exact labels."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from semslam.camera import Intrinsics
+from semslam.datasets.synthetic.atlas import TextureAtlas
+from semslam.datasets.synthetic.casting import Hits, RayCaster
+from semslam.datasets.synthetic.lighting import LAMPS, bake
+from semslam.datasets.synthetic.scene import Mesh, Scene, build_mesh
+from semslam.geometry import Float32Array, FloatArray
+
+GAMMA = 2.2
+SHOULDER = 190.0
+"""Grey level above which brightness is compressed, so that windows and lampshades do not clip hard."""
+AFTERGLOW = 0.06
+"""What is left of a lampshade's or a window's brightness while it is off."""
+SUBPIXELS = np.array([[-0.125, -0.375], [0.375, -0.125], [0.125, 0.375], [-0.375, 0.125]], dtype=np.float32)
+"""Rotated grid on which pixels at edges are cast again."""
+
+
+@dataclass(frozen=True, slots=True)
+class Lighting:
+    """How the two kinds of light are mixed.
+
+    Attributes:
+        day: weight of the windows' light.
+        lamps: weight of the lamps.
+        tint: (3,) factors of the camera's white balance and exposure.
+    """
+
+    day: float = 1.0
+    lamps: float = 0.5
+    tint: tuple[float, float, float] = (1.0, 1.0, 1.0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class View:
+    """What a perfect camera sees.
+
+    Attributes:
+        color: (H, W, 3) float32, sRGB 0..255.
+        depth: (H, W) float32 metres along the optical axis; 0 where nothing is.
+        labels: (H, W) uint8 NYU40 ids; 0 where nothing is.
+        cosine: (H, W) float32 between the ray and the surface's normal.
+    """
+
+    color: Float32Array
+    depth: Float32Array
+    labels: npt.NDArray[np.uint8]
+    cosine: Float32Array
+
+
+class Renderer:
+    """Renders one scene; building it bakes the light, which takes a few seconds.
+
+    Args:
+        scene: what is rendered.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self._mesh = build_mesh(scene)
+        self._caster = RayCaster(self._mesh.vertices, self._mesh.triangles)
+        self._atlas = TextureAtlas(scene.materials)
+        albedo = self._atlas.mean_albedo[self._mesh.materials]
+        self._light = bake(self._mesh, albedo, scene.lights, self._caster)
+        _add_glow(self._light, scene, self._mesh)
+        tiles = self._atlas.tiles[self._mesh.materials][:, None]
+        self._uvs = (self._mesh.uvs[self._mesh.triangles] / tiles).astype(np.float32)
+        self._density = _density(self._mesh, self._uvs, self._atlas.size)
+        self._tables: dict[Lighting, Float32Array] = {}
+
+    def render(self, T_world_cam: FloatArray, camera: Intrinsics, lighting: Lighting) -> View:
+        """One view from a pose, without any of the sensor's faults."""
+        shape = camera.height, camera.width
+        directions = _directions(camera).reshape(-1, 3)
+        hits, cosine = self._cast(T_world_cam, directions)
+        color = self._shade(hits, cosine, directions, camera, lighting)
+        edges = np.flatnonzero(self._edges(hits, cosine, shape))
+        fine = directions[edges].repeat(len(SUBPIXELS), axis=0)
+        fine[:, :2] += np.tile(SUBPIXELS / (camera.fx, camera.fy), (len(edges), 1)).astype(np.float32)
+        again = self._shade(*self._cast(T_world_cam, fine), fine, camera, lighting)
+        color[edges] = again.reshape(len(edges), len(SUBPIXELS), 3).mean(1)
+        labels = np.where(hits.seen, self._mesh.labels[hits.triangles], 0).astype(np.uint8)
+        return View(
+            color.reshape(*shape, 3), hits.distance.reshape(shape), labels.reshape(shape), cosine.reshape(shape)
+        )
+
+    def _cast(self, T_world_cam: FloatArray, directions: Float32Array) -> tuple[Hits, Float32Array]:
+        """Hits of directions (N, 3) with z = 1, whose distance is then the depth; and cosines of incidence (N,)."""
+        rays = np.empty((len(directions), 6), dtype=np.float32)
+        rays[:, :3] = T_world_cam[:3, 3]
+        rays[:, 3:] = directions @ T_world_cam[:3, :3].T.astype(np.float32)
+        hits = self._caster.cast(rays)
+        along = hits.normals[:, 0] * rays[:, 3] + hits.normals[:, 1] * rays[:, 4] + hits.normals[:, 2] * rays[:, 5]
+        return hits, np.abs(along) / _length(directions)
+
+    def _shade(
+        self, hits: Hits, cosine: Float32Array, directions: Float32Array, camera: Intrinsics, lighting: Lighting
+    ) -> Float32Array:
+        rows = self._table(lighting).take(hits.triangles, axis=0)
+        values = rows[:, :5] + hits.weights[:, :1] * rows[:, 5:10] + hits.weights[:, 1:] * rows[:, 10:]
+        # Between the footprint's short and long axis: a little blur along grazing surfaces rather than shimmer.
+        footprint = hits.distance * _length(directions) / (camera.fx * np.maximum(cosine, 0.03) ** 0.6)
+        lod = np.log2(np.maximum(footprint, 1e-6)) + self._density.take(hits.triangles)
+        color = self._atlas.lookup(self._mesh.materials.take(hits.triangles), values[:, :2], lod)
+        color *= values[:, 2:]
+        over = color > SHOULDER
+        rest = 255 - SHOULDER
+        color[over] = 255 - rest * np.exp((SHOULDER - color[over]) / rest)
+        color[~hits.seen] = 0
+        return color
+
+    def _table(self, lighting: Lighting) -> Float32Array:
+        """Texture coordinates and factors of the sRGB albedo, (T, 15): at the first corner, and along two edges."""
+        if lighting not in self._tables:
+            weights = (lighting.day, lighting.lamps)
+            light = sum(w * part for w, part in zip(weights, self._light, strict=True)) * np.asarray(lighting.tint)
+            shades = np.asarray(light, dtype=np.float32) ** np.float32(1 / GAMMA)
+            corners = np.concatenate([self._uvs, shades.take(self._mesh.triangles, axis=0)], -1)
+            corners[:, 1:] -= corners[:, :1]
+            self._tables[lighting] = corners.reshape(-1, 15)
+        return self._tables[lighting]
+
+    def _edges(self, hits: Hits, cosine: Float32Array, shape: tuple[int, int]) -> npt.NDArray[np.bool_]:
+        """Pixels beside another part or at a crease, (H, W)."""
+        part = self._mesh.parts.take(hits.triangles).reshape(shape)
+        depth, cosine = hits.distance.reshape(shape), cosine.reshape(shape)
+        edge = np.zeros(shape, dtype=bool)
+        row, column = slice(None), (slice(1, None), slice(-1))
+        for a, b in (((row, column[0]), (row, column[1])), ((column[0], row), (column[1], row))):
+            step = (part[a] != part[b]) & (np.abs(depth[a] - depth[b]) + np.abs(cosine[a] - cosine[b]) > 1e-3)
+            step |= (np.abs(depth[a] - depth[b]) > 0.1 * depth[a]) | (np.abs(cosine[a] - cosine[b]) > 0.15)
+            edge[a] |= step
+            edge[b] |= step
+        return edge
+
+
+def _length(directions: Float32Array) -> Float32Array:
+    return np.sqrt(np.einsum("ij,ij->i", directions, directions))
+
+
+def _directions(camera: Intrinsics) -> Float32Array:
+    rays = camera.rays()
+    return np.concatenate([rays, np.ones_like(rays[..., :1])], -1)
+
+
+def _density(mesh: Mesh, uvs: Float32Array, size: int) -> Float32Array:
+    """Log2 of the texels along a metre of each triangle, (T,)."""
+    corners = mesh.vertices[mesh.triangles]
+    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    p, q = uvs[:, 1] - uvs[:, 0], uvs[:, 2] - uvs[:, 0]
+    shown = np.abs(p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0])
+    return np.asarray(
+        np.log2(size) + 0.5 * np.log2(np.maximum(shown, 1e-12) / np.maximum(area, 1e-12)), dtype=np.float32
+    )
+
+
+def _add_glow(light: Float32Array, scene: Scene, mesh: Mesh) -> None:
+    """Give surfaces that shine by themselves the brightness of their material."""
+    for index, material in enumerate(scene.materials.values()):
+        if material.glow > 0:
+            vertices = np.unique(mesh.triangles[mesh.materials == index])
+            light[:, vertices] = AFTERGLOW * material.glow
+            light[LAMPS.index(material.lamp), vertices] = material.glow

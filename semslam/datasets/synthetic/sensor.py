@@ -1,0 +1,42 @@
+"""What a Kinect makes of a perfect view: noise, quantised disparity, holes."""
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from semslam.datasets.synthetic.renderer import View
+from semslam.geometry import Float32Array
+
+MIN_DEPTH, MAX_DEPTH = 0.4, 6.0
+COLOR_SIGMA = 2.5
+DISPARITY_STEP = 0.00287
+"""Metres at 1 m between two steps of disparity: an eighth of a pixel at a baseline of 7.5 cm and f = 580 px."""
+GRAZING = 0.12
+"""Cosine under which a surface gives no depth."""
+EDGE = 0.08
+"""Share of the depth by which neighbours differ at an edge, where depth is often missing."""
+EDGE_LOSS, RANDOM_LOSS = 0.6, 0.004
+
+
+def sense_color(color: Float32Array, rng: np.random.Generator) -> npt.NDArray[np.uint8]:
+    """An (H, W, 3) image with noise, as uint8."""
+    noise = rng.standard_normal(color.shape, dtype=np.float32) * COLOR_SIGMA
+    return np.clip(np.rint(color + noise), 0, 255).astype(np.uint8)
+
+
+def sense_depth(view: View, rng: np.random.Generator) -> Float32Array:
+    """Depth (H, W) in metres with noise that grows with the square of the depth; 0 where there is none.
+
+    The size of the noise is that of Khoshelham and Elberink, Sensors 2012: about 1.5 mm at 1 m, 2.5 cm at 4 m.
+    """
+    z = view.depth
+    sigma = 0.0012 + 0.0015 * z**2
+    noisy = z + sigma * rng.standard_normal(z.shape, dtype=np.float32)
+    step = np.maximum(DISPARITY_STEP * z**2, 1e-4)
+    noisy = np.rint(noisy / step) * step
+    smallest, largest = cv2.erode(z, np.ones((3, 3))), cv2.dilate(z, np.ones((3, 3)))
+    at_edge = largest - smallest > EDGE * z
+    draw = rng.random(z.shape, dtype=np.float32)
+    lost = (view.cosine < GRAZING) | (draw < RANDOM_LOSS) | (at_edge & (draw < EDGE_LOSS))
+    lost |= (noisy < MIN_DEPTH) | (noisy > MAX_DEPTH)
+    return np.where(lost, 0.0, noisy).astype(np.float32)
