@@ -212,7 +212,7 @@ def draw_errors(figure: Figure, run: RunDrawing) -> None:
 def draw_timeline(figure: Figure, run: RunDrawing) -> None:
     """Each candidate at the time of its query (across) and of its match (up)."""
     axes = figure.add_subplot()
-    end = run.end - run.start
+    end = max(run.end - run.start, 1.0)
     axes.plot([0, end], [0, end], color="#bbbbbb", linewidth=1)
     for kind in reversed(LoopKind):
         marks = [mark for mark in run.loops if mark.kind is kind]
