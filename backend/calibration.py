@@ -12,7 +12,7 @@ import numpy as np
 from backend.chain import BoolArray, OdometryChain, adjoints, deviations, squared_mahalanobis
 from backend.products import Edge
 from semslam.geometry import invert
-from semslam.types import FloatArray
+from semslam.types import FloatArray, IntArray
 
 QUORUM = 5
 """Fewer loops than this are no evidence against odometry."""
@@ -45,29 +45,37 @@ def loop_scale(chain: OdometryChain, loops: Sequence[Edge], limit: float) -> flo
     pairs = _neighbours(loops)
     if not pairs:
         return 1.0
-    left, own, odometry, joined = cycles(chain, [loops[i] for i, _ in pairs], [loops[j] for _, j in pairs])
+    first, second = np.array(pairs).T
+    left, own, odometry, joined = cycles(chain, loops, first, second)
     return _smallest_scale(left[joined], odometry[joined], own[joined], limit, MEDIAN, MEDIAN_CHI2)
 
 
 def cycles(
-    chain: OdometryChain, first: Sequence[Edge], second: Sequence[Edge]
+    chain: OdometryChain, loops: Sequence[Edge], first: IntArray, second: IntArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
     """How far pairs of loops are from closing a cycle with the odometry between their ends.
+
+    Args:
+        chain: odometry.
+        loops: the loops.
+        first: (P,) index of one loop of each pair.
+        second: (P,) index of the other.
 
     Returns:
         (P, 6) what is left when going round, (P, 6, 6) its covariance from the two loops, (P, 6, 6) from odometry,
         and (P,) whether odometry joins both ends.
     """
-    T_m1_q1 = np.stack([loop.T_from_to for loop in first])
-    T_m2_q2 = np.stack([loop.T_from_to for loop in second])
-    T_m1_m2, C_m, joined_m = chain.relative([e.from_key for e in first], [e.from_key for e in second])
-    T_q1_q2, C_q, joined_q = chain.relative([e.to_key for e in first], [e.to_key for e in second])
+    T_match_query = np.stack([loop.T_from_to for loop in loops])
+    covariances = np.stack([loop.covariance for loop in loops])
+    matches = np.array([loop.from_key for loop in loops])
+    queries = np.array([loop.to_key for loop in loops])
+    T_m1_q1, T_m2_q2 = T_match_query[first], T_match_query[second]
+    T_m1_m2, C_m, joined_m = chain.relative(matches[first], matches[second])
+    T_q1_q2, C_q, joined_q = chain.relative(queries[first], queries[second])
     # Round the cycle, everything expressed at the second loop's query.
     left = invert(T_m1_m2 @ T_m2_q2) @ T_m1_q1 @ T_q1_q2
     carry_1, carry_m = adjoints(invert(T_q1_q2)), adjoints(invert(T_m2_q2))
-    C_1 = np.stack([loop.covariance for loop in first])
-    C_2 = np.stack([loop.covariance for loop in second])
-    own = C_2 + carry_1 @ C_1 @ np.swapaxes(carry_1, 1, 2)
+    own = covariances[second] + carry_1 @ covariances[first] @ np.swapaxes(carry_1, 1, 2)
     odometry = C_q + carry_m @ C_m @ np.swapaxes(carry_m, 1, 2)
     return deviations(left), own, odometry, joined_m & joined_q
 

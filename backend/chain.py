@@ -23,7 +23,7 @@ class OdometryChain:
     def __init__(self, keys: Iterable[int], odometry: Iterable[Edge]) -> None:
         ordered = sorted(keys)
         steps = {(edge.from_key, edge.to_key): edge for edge in odometry}
-        self._row = {key: row for row, key in enumerate(ordered)}
+        self._keys = np.array(ordered, dtype=np.int64)
         self._T = np.tile(np.eye(4), (len(ordered), 1, 1))
         self._covariance = np.zeros((len(ordered), 6, 6))
         self._chain = np.zeros(len(ordered), dtype=np.int64)
@@ -59,13 +59,12 @@ class OdometryChain:
 
     def poses(self) -> Iterator[tuple[int, int, FloatArray]]:
         """Each key, the key its chain starts with, and its pose (4, 4) in that one."""
-        starts: dict[int, int] = {}
-        for key, row in self._row.items():
-            start = starts.setdefault(int(self._chain[row]), key)
-            yield key, start, invert(self._T[self._row[start]]) @ self._T[row]
+        first = np.searchsorted(self._chain, self._chain)
+        for row, start in enumerate(first.tolist()):
+            yield int(self._keys[row]), int(self._keys[start]), self._T[row]
 
     def _rows(self, keys: npt.ArrayLike) -> IntArray:
-        return np.array([self._row[int(key)] for key in np.asarray(keys).ravel()], dtype=np.int64)
+        return np.searchsorted(self._keys, np.asarray(keys).ravel()).astype(np.int64)
 
 
 def adjoints(T: FloatArray) -> FloatArray:

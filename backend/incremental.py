@@ -16,8 +16,8 @@ RELINEARIZE_EVERY = 10
 """Keyframes between two looks at who has moved; loops are followed at once."""
 SETTLING_STEPS = 2
 """Further iSAM2 steps after a loop came or went."""
-FIRST_RETRY = 5
-"""Waiting loops at which all are judged together; from then on each time their number has doubled."""
+FIRST_RETRY, RETRY_SHARE = 5, 0.05
+"""Waiting loops, and share of all loops, at which all are judged together; then again when they have doubled."""
 
 Pair = tuple[int, int]
 
@@ -137,7 +137,7 @@ class IncrementalPoseGraph:
         for constraint in fresh:
             if constraint not in apart:
                 self._try(constraint)
-        if apart or len(self._waiting) >= self._retry_at:
+        if apart or len(self._waiting) >= max(self._retry_at, RETRY_SHARE * len(self._graph.loops)):
             self.optimize()
             self._retry_at = max(FIRST_RETRY, 2 * len(self._waiting))
 

@@ -72,10 +72,10 @@ def optimize_graph(problem: GraphProblem, config: BackendConfig, marginals: bool
     start = place_components(start, maps, edges)
     odometry_factor, loop_factor = _scales(problem, edges, config)
     loops = [edge.widened(loop_factor) for edge in edges]
-    trusted = _trusted(problem, maps, start, odometry_factor)
-    result = solve_robustly(
-        config.robust, RobustProblem(trusted, loops, make_values(start), config.max_residual, config.max_iterations)
-    )
+    odometry = [edge.widened(odometry_factor) for edge in problem.odometry]
+    trusted = _trusted(problem, maps, start, odometry)
+    robust = RobustProblem(trusted, odometry, loops, make_values(start), config.max_residual, config.max_iterations)
+    result = solve_robustly(config.robust, robust)
     poses = read_poses(result.values, problem.poses)
     verdicts = _judge(problem, result, loops, poses, config)
     accepted = np.array([verdict.accepted for verdict in verdicts], dtype=bool)
@@ -104,14 +104,14 @@ def _scales(problem: GraphProblem, loops: Sequence[Edge], config: BackendConfig)
 
 
 def _trusted(
-    problem: GraphProblem, maps: Sequence[Sequence[int]], start: Mapping[int, FloatArray], factor: float
+    problem: GraphProblem, maps: Sequence[Sequence[int]], start: Mapping[int, FloatArray], odometry: Sequence[Edge]
 ) -> gtsam.NonlinearFactorGraph:
     graph = gtsam.NonlinearFactorGraph()
     for index, component in enumerate(maps):
         key = problem.anchor(component)
         graph.add(prior_factor(key, start[key], FLOATING_SIGMA if index else ANCHOR_SIGMA))
-    for edge in problem.odometry:
-        graph.add(between_factor(edge.widened(factor)))
+    for edge in odometry:
+        graph.add(between_factor(edge))
     return graph
 
 

@@ -1,8 +1,9 @@
 """Optimisation that false loops cannot bend: strategies by name.
 
 ``gnc``: graduated non-convexity with truncated least squares (Yang et al., RA-L 2020), odometry as known
-inliers. ``dcs``: dynamic covariance scaling (Agarwal et al., ICRA 2013). ``cauchy`` and ``huber``: the usual
-M-estimators. ``none``: plain least squares, to compare with.
+inliers. ``pcm``: the largest pairwise consistent set of loops (see ``backend.consistency``). ``dcs``: dynamic
+covariance scaling (Agarwal et al., ICRA 2013). ``cauchy`` and ``huber``: the usual M-estimators. ``none``: plain
+least squares, to compare with.
 """
 
 from collections.abc import Callable, Sequence
@@ -11,6 +12,8 @@ from dataclasses import dataclass, replace
 import gtsam
 import numpy as np
 
+from backend.chain import OdometryChain
+from backend.consistency import consistent_loops
 from backend.factors import between_factor
 from backend.products import Edge
 from semslam.errors import ConfigError, GraphError
@@ -36,6 +39,7 @@ class RobustProblem:
 
     Attributes:
         trusted: priors and odometry.
+        odometry: the trusted edges once more, as measurements.
         loops: the edges that may be false.
         initial: starting values of all keys.
         max_residual: Mahalanobis distance at which a loop is taken for false.
@@ -43,6 +47,7 @@ class RobustProblem:
     """
 
     trusted: gtsam.NonlinearFactorGraph
+    odometry: Sequence[Edge]
     loops: Sequence[Edge]
     initial: gtsam.Values
     max_residual: float
@@ -121,13 +126,26 @@ def _gnc(problem: RobustProblem) -> RobustSolution:
     return _settled(problem, values, squared)
 
 
+def _pcm(problem: RobustProblem) -> RobustSolution:
+    if not problem.loops:
+        return _plain(problem)
+    keys = problem.initial.keys()
+    chosen = consistent_loops(OdometryChain(keys, problem.odometry), problem.loops, problem.max_residual)
+    values = least_squares(_weighted(problem, chosen.astype(np.float64)), problem.initial, problem.max_iterations)
+    squared = _squared_residuals(problem.loops, values)
+    squared[~chosen] = np.inf  # what no set vouches for stays out, however well it fits by now
+    return _settled(problem, values, squared)
+
+
 def _settled(problem: RobustProblem, values: gtsam.Values, squared: FloatArray) -> RobustSolution:
-    """Plain least squares with the loops that fit, until they stay the same."""
+    """Plain least squares with the loops that fit, until they stay the same; infinite residuals stay out."""
     limit = problem.max_residual**2
+    eligible = np.isfinite(squared)
     weights = (squared <= limit).astype(np.float64)
     for _ in range(SETTLING_ROUNDS):
         values = least_squares(_weighted(problem, weights), values, problem.max_iterations)
-        fitting = (_squared_residuals(problem.loops, values) <= limit).astype(np.float64)
+        fits = _squared_residuals(problem.loops, values) <= limit
+        fitting = (fits & eligible).astype(np.float64)
         if (fitting == weights).all():
             break
         weights = fitting
@@ -170,6 +188,7 @@ def _with_kernel(make: Callable[[], Kernel]) -> Strategy:
 
 STRATEGIES: dict[str, Strategy] = {
     "gnc": _gnc,
+    "pcm": _pcm,
     "dcs": _with_kernel(lambda: gtsam.noiseModel.mEstimator.DCS.Create(DCS_PHI)),
     "cauchy": _with_kernel(lambda: gtsam.noiseModel.mEstimator.Cauchy.Create(CAUCHY_K)),
     "huber": _with_kernel(lambda: gtsam.noiseModel.mEstimator.Huber.Create(HUBER_K)),

@@ -89,7 +89,7 @@ class FeatureMapConfig(Section):
     min_landmarks: int = Field(50, gt=5, description="keypoints with depth that a keyframe must have")
     restart_seconds: float = Field(0.5, ge=0, description="a new map starts when good images meet none for so long")
     readout: float = Field(0.026, ge=0, description="seconds from an image's first row to its last (rolling shutter)")
-    readout_sigma: float = Field(0.01, ge=0, description="its uncertainty, with which it is estimated; 0 = it is known")
+    readout_sigma: float = Field(0.005, ge=0, description="its uncertainty before it is estimated; 0 = known")
     radius: float = Field(15.0, gt=0, description="pixels around a landmark's predicted place that are searched")
     narrow_radius: float = Field(10.0, gt=0, description="the same once the pose is nearly known")
     local_keyframes: int = Field(15, gt=0, description="covisible keyframes whose landmarks are looked for")
@@ -97,7 +97,7 @@ class FeatureMapConfig(Section):
     max_interval: float = Field(0.33, gt=0, description="seconds after which a keyframe is made in any case")
     max_translation: float = Field(0.1, gt=0, description="metres of motion that make one sooner")
     max_rotation: float = Field(0.15, gt=0, description="radians of motion that make one sooner")
-    min_share: float = Field(0.5, gt=0, le=1, description="share of the keypoints that must be landmarks, or one is made")
+    min_share: float = Field(0.5, gt=0, le=1, description="share of keypoints that must be landmarks")
     min_shared: int = Field(15, gt=0, description="landmarks that make two keyframes covisible")
     max_depth: float = Field(4.0, gt=0, description="metres; farther keypoints do not become landmarks")
     min_found: float = Field(0.25, ge=0, le=1, description="share of its views in which a landmark must be found")
@@ -304,7 +304,7 @@ class BundleConfig(Section):
 class BackendConfig(Section):
     """The pose graph's optimisation."""
 
-    robust: str = Field("gnc", description="how false loops are held off: gnc, dcs, cauchy, huber or none")
+    robust: str = Field("gnc", description="how false loops are held off: gnc, pcm, dcs, cauchy, huber or none")
     max_residual: float = Field(
         4.1, gt=0, description="Mahalanobis distance at which a loop is taken for false; 4.1 = 99 % of true ones"
     )

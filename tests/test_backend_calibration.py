@@ -37,14 +37,14 @@ def test_the_chains_covariance_is_the_spread_of_sampled_odometry():
     )
     rng = np.random.default_rng(1)
     there, back = [], []
-    for _ in range(4000):
+    for _ in range(1500):
         motions = [edge.T_from_to for edge in measure_odometry(truth, rng)]
         poses = compose(motions[2:9], np.eye(4))
         there.append(invert(invert(truth[2]) @ truth[9]) @ poses[-1])
         back.append(invert(invert(truth[9]) @ truth[2]) @ invert(poses[-1]))
     for samples, covariance in ((there, covariances[0]), (back, covariances[1])):
         spread = np.cov(deviations(np.stack(samples)).T)
-        assert np.abs(spread - covariance).max() < 0.1 * np.abs(covariance).max()
+        assert np.abs(spread - covariance).max() < 0.15 * np.abs(covariance).max()
 
 
 def test_edges_written_backwards_give_the_same_chain():

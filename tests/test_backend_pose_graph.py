@@ -261,7 +261,7 @@ def test_unknown_and_doubled_keys_are_refused():
 def test_an_unknown_strategy_lists_the_known_ones():
     graph = PoseGraph(BackendConfig(robust="magic"))
     graph.add_keyframe(0, np.eye(4))
-    with pytest.raises(ConfigError, match="gnc, dcs, cauchy, huber, none"):
+    with pytest.raises(ConfigError, match="gnc, pcm, dcs, cauchy, huber, none"):
         graph.optimize()
 
 
