@@ -1,10 +1,11 @@
 """The algorithm: a frame in, a state out. It reads no files, writes none and prints nothing."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
 
+from backend.bundle import adjust
 from backend.pose_graph import GraphSolution, PoseGraph
 from frontend.keyframes import KeyframePolicy, make_keyframe
 from frontend.odometry import Odometry
@@ -192,6 +193,9 @@ class Slam:
         """
         with self._stopwatch.stage("optimize"):
             solution = self._graph.optimize()
+        if self._observations:
+            with self._stopwatch.stage("bundle"):
+                solution = self._adjusted(solution)
         components = self._components(solution)
         unplaced = len(solution.components)
         return SlamResult(
@@ -250,6 +254,12 @@ class Slam:
             self._outcomes.append(outcome)
             if isinstance(outcome, LoopConstraint):
                 self._graph.add_loop(outcome)
+
+    def _adjusted(self, solution: GraphSolution) -> GraphSolution:
+        """The solution with its poses after bundle adjustment of the landmarks that the odometry keeps."""
+        intrinsics = self._keyframes[0].intrinsics
+        result = adjust(solution.poses, self._observations, intrinsics, self._config.backend.bundle, solution.edges)
+        return replace(solution, poses=result.poses)
 
     def _components(self, solution: GraphSolution) -> dict[int, int]:
         """For each map of the odometry the place of its component in ``solution.components``, the largest first."""
