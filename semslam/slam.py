@@ -10,6 +10,7 @@ from backend.pose_graph import GraphSolution, PoseGraph
 from frontend.keyframes import KeyframePolicy, make_keyframe
 from frontend.odometry import Odometry
 from loop.detector import LoopDetector
+from loop.segmentation.build import build_segmenter
 from loop.segmentation.segmenter import Segmenter
 from loop.verification import IcpVerifier, LoopVerifier
 from semslam import plugins
@@ -140,12 +141,9 @@ class Slam:
             ModelError: the network's weights are missing or damaged.
         """
         detector = plugins.load("semslam.detectors", config.detector).from_config(config)
-        segmenter = None
-        if detector.needs_labels:
-            segmenter = plugins.load("semslam.segmenters", config.segmentation.name).from_config(config)
         return cls(
             odometry=plugins.load("semslam.odometry", config.odometry).from_config(config),
-            segmenter=segmenter,
+            segmenter=build_segmenter(config) if detector.needs_labels else None,
             detector=detector,
             verifier=IcpVerifier.from_config(config),
             graph=PoseGraph(config.backend),
