@@ -118,7 +118,7 @@ Drawer = Callable[[Figure, RunDrawing], None]
 
 
 def draw_run(run: RunDrawing) -> dict[str, bytes]:
-    """All pictures of a run as PNG: "trajectory", "axes", "error" and "loops".
+    """All pictures of a run as PNG: "trajectory", "loops", "axes" and "error".
 
     Without ground truth "error" shows how far the loops moved each pose instead.
 
@@ -130,9 +130,9 @@ def draw_run(run: RunDrawing) -> dict[str, bytes]:
     aligned = _aligned(run)
     return {
         "trajectory": render(lambda figure: draw_top_view(figure, aligned), (7.6, 6.0)),
+        "loops": render(lambda figure: draw_timeline(figure, aligned), (7.6, 6.0)),
         "axes": render(lambda figure: draw_axes(figure, aligned), (9.0, 6.0)),
-        "error": render(lambda figure: draw_errors(figure, aligned), (9.0, 3.8)),
-        "loops": render(lambda figure: draw_timeline(figure, aligned), (7.0, 6.0)),
+        "error": render(lambda figure: draw_errors(figure, aligned), (9.0, 6.0)),
     }
 
 

@@ -46,7 +46,7 @@ def is_picture(png: bytes) -> bool:
 )
 def test_every_kind_of_run_gives_four_pictures(run: RunDrawing) -> None:
     pictures = draw_run(run)
-    assert list(pictures) == ["trajectory", "axes", "error", "loops"]
+    assert list(pictures) == ["trajectory", "loops", "axes", "error"]
     assert all(is_picture(png) for png in pictures.values())
 
 
