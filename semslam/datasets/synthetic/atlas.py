@@ -91,12 +91,12 @@ class TextureAtlas:
 
     def _bilinear(self, index: npt.NDArray[np.int64], inside: Float32Array) -> Float32Array:
         place = self._places.reshape(-1, 3).take(index, axis=0)
-        xy = np.zeros((-(-len(inside) // ROW) * ROW, 2), dtype=np.float32)
-        np.multiply(inside, place[:, 2:], out=xy[: len(inside)])
-        xy[: len(inside)] += place[:, :2]
-        xy = xy.reshape(-1, ROW, 2)
-        colors = np.empty((*xy.shape[:2], 3), dtype=np.float32)
-        for start in range(0, len(xy), 32000):
+        flat = np.zeros((-(-len(inside) // ROW) * ROW, 2), dtype=np.float32)
+        np.multiply(inside, place[:, 2:], out=flat[: len(inside)])
+        flat[: len(inside)] += place[:, :2]
+        x, y = flat[:, 0].reshape(-1, ROW), flat[:, 1].reshape(-1, ROW)
+        colors = np.empty((len(x), ROW, 3), dtype=np.float32)
+        for start in range(0, len(x), 32000):
             rows = slice(start, start + 32000)
-            colors[rows] = cv2.remap(self._image, xy[rows], None, cv2.INTER_LINEAR)
+            colors[rows] = cv2.remap(self._image, x[rows], y[rows], cv2.INTER_LINEAR)
         return colors.reshape(-1, 3)[: len(inside)]

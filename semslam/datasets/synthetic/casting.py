@@ -41,12 +41,11 @@ class RayCaster:
 
         # One thread builds the tree, so that rays that meet two triangles at once choose the same one every time.
         self._scene: Any = o3d.t.geometry.RaycastingScene(nthreads=1)
-        self._tensor: Any = o3d.core.Tensor
-        self._scene.add_triangles(self._tensor(vertices.astype(np.float32)), self._tensor(triangles.astype(np.uint32)))
+        self._scene.add_triangles(_tensor(vertices.astype(np.float32)), _tensor(triangles.astype(np.uint32)))
 
     def cast(self, rays: Float32Array) -> Hits:
         """First hit of each ray."""
-        found = self._scene.cast_rays(self._tensor(rays))
+        found = self._scene.cast_rays(_tensor(rays))
         distance = found["t_hit"].numpy()
         seen = np.isfinite(distance)
         triangles = np.where(seen, found["primitive_ids"].numpy(), 0).astype(np.int64)
@@ -55,4 +54,10 @@ class RayCaster:
 
     def blocked(self, rays: Float32Array, far: float) -> npt.NDArray[np.bool_]:
         """Whether anything lies on each ray nearer than ``far`` lengths of its direction, (N,)."""
-        return np.asarray(self._scene.test_occlusions(self._tensor(rays), 0.0, far).numpy(), dtype=bool)
+        return np.asarray(self._scene.test_occlusions(_tensor(rays), 0.0, far).numpy(), dtype=bool)
+
+
+def _tensor(array: Any) -> Any:
+    import open3d as o3d
+
+    return o3d.core.Tensor.from_numpy(np.ascontiguousarray(array))

@@ -1,25 +1,23 @@
 """Rendered scenes as a dataset: ``synthetic:house?seed=1&light=dim``."""
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, fields
-from functools import cached_property
+from collections.abc import Iterator
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import ClassVar, Self
 from urllib.parse import parse_qsl
 
 import numpy as np
 import numpy.typing as npt
+from pydantic import Field, ValidationError, field_validator
 
-from semslam.config import DatasetConfig
+from semslam.config import DatasetConfig, Section
 from semslam.datasets.synthetic.path import Walk, walk
 from semslam.datasets.synthetic.renderer import Lighting, Renderer, View
-from semslam.datasets.synthetic.scene import Scene
-from semslam.datasets.synthetic.scenes import make_house, make_twins
+from semslam.datasets.synthetic.scenes import PLANS
 from semslam.datasets.synthetic.sensor import sense_color, sense_depth
 from semslam.errors import DatasetError
 from semslam.types import Frame, Intrinsics, Trajectory
 
-SCENES: dict[str, Callable[[int, bool], Scene]] = {"house": make_house, "twins": make_twins}
 LIGHTS = {
     "same": Lighting(),
     "dim": Lighting(day=0.35, lamps=0.3),
@@ -31,52 +29,59 @@ FIELD_OF_VIEW = 262.5 / 320.0
 """Focal length as a share of the image's width, as a Kinect's."""
 
 
-@dataclass(frozen=True, slots=True)
-class Request:
-    """What may stand behind the question mark.
+class Request(Section):
+    """What may stand behind the question mark."""
 
-    Attributes:
-        seed: of textures, sway and noise.
-        frames: frames at the most; 0 = the whole way.
-        rate: frames a second.
-        width: pixels; the height is three quarters of it.
-        light: light of the second pass, one of ``LIGHTS``.
-        offset: metres by which the second pass keeps to the right of the first.
-        moved: 1 = objects moved or missing on the second pass.
-        noise: 0 = a perfect sensor.
-    """
+    seed: int = Field(0, ge=0, description="seed of textures, small things, sway and noise")
+    frames: int = Field(0, ge=0, description="frames at the most; 0 = the whole way")
+    rate: float = Field(10.0, gt=0, le=1000, description="frames a second")
+    width: int = Field(320, ge=64, le=4096, multiple_of=4, description="pixels; the height is three quarters of it")
+    light: str = Field("same", description="light of the second pass: " + ", ".join(LIGHTS))
+    offset: float = Field(0.0, ge=-1, le=1, description="metres that the second pass keeps to the right of the first")
+    moved: bool = Field(False, description="objects moved or missing on the second pass")
+    noise: bool = Field(True, description="whether the sensor has noise and holes")
 
-    seed: int = 0
-    frames: int = 0
-    rate: float = 10.0
-    width: int = 320
-    light: str = "same"
-    offset: float = 0.0
-    moved: int = 0
-    noise: int = 1
+    @field_validator("light")
+    @classmethod
+    def _is_known(cls, light: str) -> str:
+        if light not in LIGHTS:
+            raise ValueError(f"'{light}' is none of {', '.join(LIGHTS)}")
+        return light
+
+    @classmethod
+    def parse(cls, query: str) -> Self:
+        """Read ``key=value&key=value``.
+
+        Raises:
+            DatasetError: a key is unknown, or a value out of its range.
+        """
+        values = dict(parse_qsl(query, keep_blank_values=True))
+        if unknown := sorted(set(values) - set(cls.model_fields)):
+            raise DatasetError(f"Synthetic scenes have no switch '{unknown[0]}'. Known: {', '.join(cls.model_fields)}.")
+        try:
+            return cls.model_validate(values)
+        except ValidationError as error:
+            first = error.errors()[0]
+            raise DatasetError(f"The switch '{first['loc'][0]}' of a synthetic scene: {first['msg']}.") from error
 
 
 class SyntheticDataset:
     """A rendered sequence; frames are made when they are read, poses and depth are exact but for the sensor.
 
     Args:
-        scene: "house" (four rooms and a corridor) or "twins" (two rooms that look alike).
+        scene: "house" (four rooms and a corridor), "twins" (two rooms that look alike) or "room".
         request: switches.
 
     Raises:
-        DatasetError: the scene or a switch is unknown.
+        DatasetError: the scene is unknown.
     """
 
     layout: ClassVar[str] = "synthetic:SCENE"
 
     def __init__(self, scene: str, request: Request) -> None:
-        if scene not in SCENES:
-            raise DatasetError(f"There is no synthetic scene '{scene}'. Known: {', '.join(SCENES)}.")
-        if request.light not in LIGHTS:
-            raise DatasetError(f"There is no light '{request.light}'. Known: {', '.join(LIGHTS)}.")
-        if request.rate <= 0 or request.width < 64 or request.width % 4 or request.frames < 0 or request.seed < 0:
-            raise DatasetError(f"These figures are not usable for a synthetic scene: {request}.")
-        self._make = SCENES[scene]
+        if scene not in PLANS:
+            raise DatasetError(f"There is no synthetic scene '{scene}'. Known: {', '.join(PLANS)}.")
+        self._scene = scene
         self._request = request
         self.name = f"synthetic-{scene}"
 
@@ -87,18 +92,13 @@ class SyntheticDataset:
 
     @classmethod
     def open(cls, path: str | Path, config: DatasetConfig) -> Self:
-        """Take ``synthetic:SCENE?key=value&...``; the keys are those of ``Request``."""
+        """Take ``synthetic:SCENE?key=value&...``; the keys are those of ``Request``, the scene is "house" if left out.
+
+        Raises:
+            DatasetError: the scene or a switch is unknown, or a value out of its range.
+        """
         scene, _, query = str(path).partition(":")[2].partition("?")
-        kinds = {field.name: type(field.default) for field in fields(Request)}
-        values: dict[str, int | float | str] = {}
-        for key, text in parse_qsl(query, keep_blank_values=True):
-            if key not in kinds:
-                raise DatasetError(f"A synthetic scene has no switch '{key}'. Known: {', '.join(kinds)}.")
-            try:
-                values[key] = kinds[key](text)
-            except ValueError as error:
-                raise DatasetError(f"The switch {key} of a synthetic scene cannot be '{text}'.") from error
-        return cls(scene or "house", Request(**values))  # type: ignore[arg-type]
+        return cls(scene or "house", Request.parse(query))
 
     @property
     def intrinsics(self) -> Intrinsics:
@@ -145,21 +145,19 @@ class SyntheticDataset:
     def view(self, index: int) -> View:
         """What a perfect camera sees in a frame."""
         second = bool(self._walk.second[index])
-        renderer = self._second_renderer if second and self._request.moved else self._first_renderer
+        renderer = _renderer(self._scene, self._request.seed, bool(second and self._request.moved))
         lighting = LIGHTS[self._request.light] if second else LIGHTS["same"]
         return renderer.render(self._walk.poses[index], self.intrinsics, lighting)
 
     @cached_property
-    def _first_renderer(self) -> Renderer:
-        return Renderer(self._make(self._request.seed, False))
-
-    @cached_property
-    def _second_renderer(self) -> Renderer:
-        return Renderer(self._make(self._request.seed, True))
-
-    @cached_property
     def _walk(self) -> Walk:
         request = self._request
-        whole = walk(self._make(request.seed, False), request.rate, request.seed, request.offset)
+        whole = walk(PLANS[self._scene].route, request.rate, request.seed, request.offset)
         kept = slice(0, request.frames or None)
         return Walk(whole.timestamps[kept], whole.poses[kept], whole.second[kept])
+
+
+@lru_cache(maxsize=4)
+def _renderer(scene: str, seed: int, moved: bool) -> Renderer:
+    """A scene ready to be rendered; kept, since its light takes seconds to bake."""
+    return Renderer(PLANS[scene].build(seed, moved))

@@ -4,7 +4,7 @@ import numpy as np
 
 from semslam.datasets.synthetic import labels
 from semslam.datasets.synthetic.scene import Light
-from semslam.datasets.synthetic.shapes import Part, box, drape, panel, placed, quad, sheet, soft_box, turned
+from semslam.datasets.synthetic.shapes import Part, box, drape, leaf, panel, placed, quad, sheet, soft_box, turned
 
 SPINES = 32
 """Spines on one image of book backs."""
@@ -37,10 +37,10 @@ def bookcase(
     gap = (height - 0.08) / shelves
     parts = [box((x, depth / 2, height / 2), (thick, depth, height), wood, label) for x in (-width / 2, width / 2)]
     parts.append(box((0, 0.008, height / 2), (width, 0.012, height), wood, label))
-    for k in range(shelves + 1):
-        parts.append(box((0, depth / 2, 0.06 + k * gap), (width - thick, depth, thick), wood, label))
-    for k in range(shelves):
-        floor = 0.06 + k * gap + thick / 2
+    levels = [0.06 + k * gap for k in range(shelves + 1)]
+    parts += [box((0, depth / 2, z), (width - thick, depth, thick), wood, label) for z in levels]
+    for level in levels[:-1]:
+        floor = level + thick / 2
         clear = gap - thick
         if rng.random() < 0.75:
             share = float(rng.uniform(0.55, 0.98))
@@ -89,12 +89,10 @@ def window(width: float, height: float, view: str, frame: str, wall: float = 0.1
     """What fills an opening of the given size, its lower edge at z = 0: pane, bars, reveal, sill; and its light."""
     label, deep = labels.WINDOW, wall * 0.9
     parts = [panel((0, -deep, height / 2), width, height, view, label, spacing=5.0)]
-    for x in (-width / 2, 0.0, width / 2):
-        parts.append(box((x, -deep + 0.03, height / 2), (0.06, 0.05, height), frame, label))
-    for z in (0.0, 0.7 * height, height):
-        parts.append(box((0, -deep + 0.03, z), (width, 0.045, 0.06), frame, label))
-    for side in (-1, 1):
-        parts.append(box((side * (width / 2 + 0.02), -deep / 2, height / 2), (0.04, deep, height), frame, label))
+    half, bar, jamb = width / 2, -deep + 0.03, width / 2 + 0.02
+    parts += [box((x, bar, height / 2), (0.06, 0.05, height), frame, label) for x in (-half, 0.0, half)]
+    parts += [box((0, bar, z), (width, 0.045, 0.06), frame, label) for z in (0.0, 0.7 * height, height)]
+    parts += [box((x, -deep / 2, height / 2), (0.04, deep, height), frame, label) for x in (-jamb, jamb)]
     parts.append(box((0, -deep / 2, height + 0.02), (width + 0.08, deep, 0.04), frame, label))
     parts.append(box((0, -deep / 2 + 0.05, -0.02), (width + 0.14, deep + 0.1, 0.04), frame, label))
     strength = 2.4 * width * height / 9
@@ -184,11 +182,12 @@ def door_leaf(width: float, height: float, image: str, wood: str) -> list[Part]:
 def plant(rng: np.random.Generator, pot: str, foliage: str, height: float) -> list[Part]:
     """A pot with a bush of crossed leaves, about (0, 0.2)."""
     parts = [turned([(0.11, 0.0), (0.16, 0.28), (0.0, 0.26)], (0, 0.2, 0), pot, labels.OTHER_PROP)]
-    for _ in range(26):
-        size = float(rng.uniform(0.14, 0.26))
-        leaf = soft_box((size / 2, 0, 0), (size, 0.012, size * 0.4), foliage, labels.OTHER_PROP, 0.005)
-        parts += placed([leaf], 0, 0.2, float(rng.uniform(0, 2 * np.pi)), float(rng.uniform(0.4, height)))
-    return parts
+    for _ in range(34):
+        length = float(rng.uniform(0.2, 0.42))
+        blade = leaf(length, 0.3 * length, float(rng.uniform(0.1, 0.5)), foliage, labels.OTHER_PROP)
+        parts += placed([blade], 0, 0.2, float(rng.uniform(0, 2 * np.pi)), 0.27 + float(rng.uniform(0, height - 0.4)))
+    stalk = [(0.015, 0.2), (0.008, height)]
+    return [*parts, turned(stalk, (0, 0.2, 0), foliage, labels.OTHER_PROP, 6)]
 
 
 def carton_box(width: float, depth: float, height: float, image: str) -> list[Part]:

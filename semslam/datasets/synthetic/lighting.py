@@ -39,7 +39,7 @@ def bake(mesh: Mesh, albedo: FloatArray, lights: Sequence[Light], caster: RayCas
         direct[LAMPS.index(light.lamp), lit] += strength[:, None] * np.asarray(light.color, dtype=np.float32)
     seen = _surroundings(origins, mesh.normals, caster, len(mesh.triangles))
     reflectance = (REFLECTED * albedo).astype(np.float32)
-    total = direct
+    total: Float32Array = direct
     for _ in range(BOUNCES):
         # The last row stands for rays that meet nothing.
         thrown = np.zeros((len(mesh.triangles) + 1, len(LAMPS) * 3), dtype=np.float32)
@@ -48,7 +48,7 @@ def bake(mesh: Mesh, albedo: FloatArray, lights: Sequence[Light], caster: RayCas
         gathered = np.zeros((len(mesh.vertices), len(LAMPS) * 3), dtype=np.float32)
         for column in seen:
             gathered += thrown.take(column, axis=0)
-        total = direct + gathered.reshape(-1, len(LAMPS), 3).transpose(1, 0, 2) / len(seen)
+        total = direct + gathered.reshape(-1, len(LAMPS), 3).transpose(1, 0, 2) / np.float32(len(seen))
     return total
 
 

@@ -1,13 +1,13 @@
 """The camera's way: a smooth walk past all stops, with the sway of a hand, and part of it a second time."""
 
-import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
 
-from semslam.datasets.synthetic.scene import Scene, Stop
+from semslam.datasets.synthetic.routes import Route, Stop
 from semslam.geometry import FloatArray
 
 SPEED = 0.55
@@ -35,20 +35,18 @@ class Walk:
     second: npt.NDArray[np.bool_]
 
 
-def walk(scene: Scene, rate: float, seed: int, offset: float = 0.0) -> Walk:
-    """Walk through a scene.
+def walk(route: Route, rate: float, seed: int, offset: float = 0.0) -> Walk:
+    """Walk along a route.
 
     Args:
-        scene: gives the stops.
+        route: gives the stops.
         rate: frames a second.
         seed: of the sway.
         offset: metres by which the second pass keeps to the right of the first.
     """
-    turn = round((scene.first_pass[-1].yaw - scene.first_pass[0].yaw) / 360.0) * 360.0
-    again = [replace(stop, yaw=stop.yaw + turn) for stop in scene.first_pass[1 : scene.second_pass]]
-    stops = [*scene.first_pass, *again]
+    stops = route.both_passes()
     knots = _times(stops)
-    returned = knots[len(scene.first_pass) - 1]
+    returned = knots[len(route.stops) - 1]
     times = np.arange(0.0, knots[-1], 1.0 / rate)
     tracks = _smooth(knots, np.array([[s.x, s.y, HEIGHT, s.yaw, s.pitch, 0.0] for s in stops]), times)
     tracks += _sway(times, seed)
@@ -62,8 +60,7 @@ def walk(scene: Scene, rate: float, seed: int, offset: float = 0.0) -> Walk:
 def _times(stops: Sequence[Stop]) -> FloatArray:
     """Seconds at which each stop is passed."""
     steps = [
-        max(float(np.hypot(b.x - a.x, b.y - a.y)) / SPEED, abs(b.yaw - a.yaw) / TURN, 0.4)
-        for a, b in itertools.pairwise(stops)
+        max(float(np.hypot(b.x - a.x, b.y - a.y)) / SPEED, abs(b.yaw - a.yaw) / TURN, 0.4) for a, b in pairwise(stops)
     ]
     return np.concatenate([[0.0], np.cumsum(steps)])
 

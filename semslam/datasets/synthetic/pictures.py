@@ -2,18 +2,19 @@
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 
 from semslam.datasets.synthetic.textures import SIZE, Color, Image, fractal
 
 LETTERS = "ABCDEFGHIKLMNOPRSTUVWXYZ"
 
 
-def _tuple(color: np.ndarray) -> tuple[float, float, float]:  # type: ignore[type-arg]
+def _tuple(color: npt.NDArray[np.floating]) -> Color:
     r, g, b = (float(c) for c in np.clip(color, 0, 255))
     return r, g, b
 
 
-def palette(rng: np.random.Generator, count: int) -> list[tuple[float, float, float]]:
+def palette(rng: np.random.Generator, count: int) -> list[Color]:
     """Colours that go together: a few hues at spread values."""
     hues = (rng.integers(180) + np.array([0, 12, 90, 150])) % 180
     hsv = np.stack([rng.choice(hues, count), rng.integers(40, 190, count), np.linspace(50, 235, count).astype(int)], -1)

@@ -139,7 +139,7 @@ class Renderer:
 
 
 def _length(directions: Float32Array) -> Float32Array:
-    return np.sqrt(np.einsum("ij,ij->i", directions, directions))
+    return np.asarray(np.sqrt(np.einsum("ij,ij->i", directions, directions)))
 
 
 def _directions(camera: Intrinsics) -> Float32Array:

@@ -1,8 +1,8 @@
 """The shell of a room and the placing of things in it."""
 
-import itertools
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -91,7 +91,7 @@ class Room:
             xs |= {hole.along - hole.width / 2, hole.along + hole.width / 2}
         stops = sorted(xs)
         parts = []
-        for left, right in itertools.pairwise(stops):
+        for left, right in pairwise(stops):
             middle = (left + right) / 2
             cut = [o for o in holes if abs(o.along - middle) < o.width / 2]
             spans = [(0.0, cut[0].bottom), (cut[0].top, HEIGHT)] if cut else [(0.0, HEIGHT)]
@@ -109,5 +109,7 @@ class Room:
 def _moved(light: Light, x: float, y: float, z: float, yaw: float) -> Light:
     R = exp_so3((0.0, 0.0, yaw))
     px, py, pz = (float(c) for c in R @ light.position + (x, y, z))
-    normal = None if light.normal is None else tuple(float(c) for c in R @ light.normal)
-    return replace(light, position=(px, py, pz), normal=normal)
+    if light.normal is None:
+        return replace(light, position=(px, py, pz))
+    nx, ny, nz = (float(c) for c in R @ light.normal)
+    return replace(light, position=(px, py, pz), normal=(nx, ny, nz))

@@ -1,4 +1,4 @@
-"""A scene: triangles with materials and labels, the lights in it, and the camera's way through it."""
+"""A scene: triangles with materials and labels, and the lights in it."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -28,23 +28,6 @@ class Light:
     lamp: str = "lamps"
 
 
-@dataclass(frozen=True, slots=True)
-class Stop:
-    """A place on the camera's way.
-
-    Attributes:
-        x: metres.
-        y: metres.
-        yaw: degrees in which it looks, counter-clockwise from +x; not wrapped, so that it tells the turn's sense.
-        pitch: degrees, positive upwards.
-    """
-
-    x: float
-    y: float
-    yaw: float
-    pitch: float = -10.0
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene:
     """What is rendered.
@@ -53,15 +36,11 @@ class Scene:
         parts: all surfaces.
         materials: by name.
         lights: all lights.
-        first_pass: the camera's way until it is back at its start.
-        second_pass: how many stops of the first pass it then follows again.
     """
 
     parts: Sequence[Part]
     materials: Mapping[str, Material]
     lights: Sequence[Light]
-    first_pass: Sequence[Stop]
-    second_pass: int
 
 
 @dataclass(frozen=True, slots=True, eq=False)

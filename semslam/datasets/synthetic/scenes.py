@@ -1,77 +1,89 @@
-"""Floor plans and the camera's way through them."""
+"""The scenes by name: what stands where, and the camera's way through it."""
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
-from semslam.datasets.synthetic import fittings, house
+from semslam.datasets.synthetic import fittings, furnishing, routes
 from semslam.datasets.synthetic.catalog import make_materials
 from semslam.datasets.synthetic.rooms import WALL, Room
-from semslam.datasets.synthetic.scene import Light, Scene, Stop
+from semslam.datasets.synthetic.routes import Route
+from semslam.datasets.synthetic.scene import Light, Scene
 from semslam.datasets.synthetic.shapes import Part, placed
 
-HOUSE_WAY = (
-    Stop(3.3, 2.6, 185), Stop(2.85, 2.4, 222), Stop(2.9, 1.5, 268), Stop(3.3, 1.6, 320), Stop(3.9, 2.5, 358),
-    Stop(4.7, 2.95, 360), Stop(5.5, 3.0, 350), Stop(6.2, 2.9, 318), Stop(6.9, 2.5, 284), Stop(7.1, 2.4, 340),
-    Stop(7.3, 2.6, 400), Stop(8.1, 3.1, 446), Stop(8.6, 3.7, 450), Stop(8.6, 4.5, 462), Stop(8.3, 4.85, 530),
-    Stop(7.4, 4.85, 540), Stop(6.3, 4.85, 532), Stop(5.7, 5.1, 470), Stop(5.6, 5.7, 450), Stop(5.65, 6.5, 420),
-    Stop(6.0, 7.4, 395), Stop(6.8, 8.05, 350), Stop(7.4, 8.1, 300), Stop(6.9, 8.05, 230), Stop(6.0, 7.6, 196),
-    Stop(5.65, 6.7, 255), Stop(5.6, 5.8, 270), Stop(5.5, 5.1, 230), Stop(4.9, 4.85, 182), Stop(3.9, 4.85, 160),
-    Stop(3.3, 5.1, 104), Stop(3.2, 5.8, 92), Stop(3.15, 6.4, 120), Stop(3.0, 7.0, 160), Stop(3.0, 7.5, 186),
-    Stop(2.9, 7.7, 222), Stop(2.75, 7.5, 250), Stop(2.85, 7.0, 268), Stop(3.2, 6.3, 276), Stop(3.2, 5.6, 272),
-    Stop(3.45, 4.95, 310), Stop(4.05, 4.75, 294), Stop(4.3, 4.1, 270), Stop(4.25, 3.4, 248), Stop(3.8, 2.9, 210),
-    Stop(3.3, 2.6, 185),
-)  # fmt: skip
-
-STUDY_TOUR = (
-    Stop(3.1, 3.3, 250), Stop(2.5, 2.7, 232), Stop(1.9, 2.5, 262), Stop(1.8, 2.3, 300), Stop(1.9, 2.3, 345),
-    Stop(2.2, 2.5, 395), Stop(2.8, 3.0, 440), Stop(3.1, 3.5, 450),
-)  # fmt: skip
+Surfaces = tuple[list[Part], list[Light]]
+CORRIDOR_NORTH, CORRIDOR_SOUTH = 5.65, 4.05
+"""Middle of the walls on both sides of the corridor, y in metres."""
 
 
-def make_house(seed: int, moved: bool) -> Scene:
-    """Four rooms and a corridor, 9.6 x 9.4 m; the way passes all and starts again to the kitchen."""
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """A scene that can be asked for.
+
+    Attributes:
+        furnish: gives all surfaces and lights for a seed, before or after things were moved.
+        route: the camera's way.
+    """
+
+    furnish: Callable[[int, bool], Surfaces]
+    route: Route
+
+    def build(self, seed: int, moved: bool) -> Scene:
+        """The whole scene, its materials painted.
+
+        Args:
+            seed: of textures, books and small things.
+            moved: whether some things stand elsewhere or are gone.
+        """
+        parts, lights = self.furnish(seed, moved)
+        return Scene(parts, make_materials(seed, (part.material for part in parts)), lights)
+
+
+def _house(seed: int, moved: bool) -> Surfaces:
     parts, lights = _joined(
-        (house.living_room(seed, moved), 0.0, 0.0),
-        (house.study(seed, moved), 5.4 + WALL, 0.0),
-        (house.corridor(seed, moved), 0.0, 4.0 + WALL),
-        (house.bedroom(seed, moved), 0.0, 5.6 + WALL),
-        (house.kitchen(seed, moved), 4.4 + WALL, 5.6 + WALL),
+        (furnishing.living_room(seed, moved), 0.0, 0.0),
+        (furnishing.study(seed, moved), 5.4 + WALL, 0.0),
+        (furnishing.corridor(seed, moved), 0.0, 4.0 + WALL),
+        (furnishing.bedroom(seed, moved), 0.0, 5.6 + WALL),
+        (furnishing.kitchen(seed, moved), 4.4 + WALL, 5.6 + WALL),
     )
-    for x, y in ((4.3, 4.05), (8.6, 4.05), (3.2, 5.65), (5.6, 5.65)):
-        parts += placed(fittings.door_frame(*house.DOOR, WALL, "white_wood"), x, y)
-    parts += placed(fittings.door_frame(*house.DOOR, WALL, "white_wood"), 5.45, 3.0, np.pi / 2)
+    for x, y in ((4.3, CORRIDOR_SOUTH), (8.6, CORRIDOR_SOUTH), (3.2, CORRIDOR_NORTH), (5.6, CORRIDOR_NORTH)):
+        parts += _frame(x, y)
+    parts += _frame(5.45, 3.0, np.pi / 2)
     # Leaves stand open into the rooms: hinge and the direction they point in.
     for x, y, yaw in ((3.83, 3.96, -100), (9.06, 3.96, -85), (3.67, 5.74, 75), (5.13, 5.74, 100)):
-        parts += placed(fittings.door_leaf(0.9, 2.04, "door", "white_wood"), x, y, np.radians(yaw))
-    return Scene(parts, make_materials(seed), lights, HOUSE_WAY, 23)
+        parts += _leaf(x, y, yaw)
+    return parts, lights
 
 
-def make_twins(seed: int, moved: bool) -> Scene:
-    """Two studies with the same furniture, an office chair and a box apart, on one corridor: bait for false loops."""
+def _twins(seed: int, moved: bool) -> Surfaces:
     parts, lights = _joined(
-        (house.study(seed, moved, archway=False), 1.2, 0.0),
-        (house.study(seed, not moved, archway=False), 5.4 + WALL, 0.0),
-        (house.corridor(seed, moved), 0.0, 4.0 + WALL),
+        (furnishing.study(seed, moved, archway=False), *routes.TWIN_CORNERS[0]),
+        (furnishing.study(seed, moved, archway=False, twin=True), *routes.TWIN_CORNERS[1]),
+        (furnishing.corridor(seed, moved), 0.0, 4.0 + WALL),
     )
     for x in (4.3, 8.6):
-        parts += placed(fittings.door_frame(*house.DOOR, WALL, "white_wood"), x, 4.05)
+        parts += _frame(x, CORRIDOR_SOUTH)
     for x in (3.2, 5.6):
-        parts += placed(fittings.door_frame(*house.DOOR, WALL, "white_wood"), x, 5.65)
-        parts += placed(fittings.door_leaf(0.9, 2.04, "door", "white_wood"), x + 0.45, 5.65, np.pi)
-    first, second = _shifted(STUDY_TOUR, 1.2, 0.0), _shifted(STUDY_TOUR, 5.4 + WALL, 0.0)
-    there = (Stop(4.35, 4.85, 410), Stop(6.4, 4.9, 360), Stop(8.2, 4.85, 320), Stop(8.6, 4.2, 270))
-    back = (Stop(8.5, 4.85, 500), Stop(6.4, 4.9, 540), Stop(4.7, 4.85, 590), Stop(4.3, 4.2, 625))
-    home = Stop(first[0].x, first[0].y, first[0].yaw + 360, first[0].pitch)
-    return Scene(parts, make_materials(seed), lights, (*first, *there, *second, *back, home), len(STUDY_TOUR))
+        parts += [*_frame(x, CORRIDOR_NORTH), *_leaf(x + 0.45, CORRIDOR_NORTH, 180)]
+    return parts, lights
 
 
-def _shifted(stops: Sequence[Stop], x: float, y: float) -> tuple[Stop, ...]:
-    return tuple(replace(stop, x=stop.x + x, y=stop.y + y) for stop in stops)
+def _room(seed: int, moved: bool) -> Surfaces:
+    parts, lights = _joined((furnishing.study(seed, moved, archway=False), 0.0, 0.0))
+    return [*parts, *_frame(3.1, CORRIDOR_SOUTH), *_leaf(3.55, CORRIDOR_SOUTH, 180)], lights
 
 
-def _joined(*rooms: tuple[Room, float, float]) -> tuple[list[Part], list[Light]]:
+def _frame(x: float, y: float, yaw: float = 0.0) -> list[Part]:
+    return placed(fittings.door_frame(*furnishing.DOOR, WALL, "white_wood"), x, y, yaw)
+
+
+def _leaf(x: float, y: float, degrees: float) -> list[Part]:
+    return placed(fittings.door_leaf(0.9, 2.04, "door", "white_wood"), x, y, np.radians(degrees))
+
+
+def _joined(*rooms: tuple[Room, float, float]) -> Surfaces:
     parts: list[Part] = []
     lights: list[Light] = []
     for room, x, y in rooms:
@@ -79,3 +91,11 @@ def _joined(*rooms: tuple[Room, float, float]) -> tuple[list[Part], list[Light]]
         parts += more
         lights += shine
     return parts, lights
+
+
+PLANS = {
+    "house": Plan(_house, routes.HOUSE),
+    "twins": Plan(_twins, routes.TWINS),
+    "room": Plan(_room, routes.ROOM),
+}
+"""house: four rooms and a corridor, 9.6 x 9.4 m. twins: two studies that look alike on one corridor. room: a study."""

@@ -3,16 +3,16 @@
 A part lives in the frame of its piece of furniture: z up, back against y = 0, front towards +y.
 """
 
-import itertools
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
 
 from semslam.geometry import FloatArray, exp_so3
 
-Vector = Sequence[float]
+Vector = Sequence[float] | FloatArray
 SPACING = 0.22
 """Metres between vertices at the most, so that light baked at them shows soft shadows."""
 WHOLE = np.array([[0.0, 0.0], [1.0, 1.0]])
@@ -166,7 +166,7 @@ def turned(profile: Sequence[Vector], centre: Vector, material: str, label: int,
     ring = np.stack([np.cos(angles), np.sin(angles)], -1)
     length = 0.0
     pieces = []
-    for low, high in itertools.pairwise(line):
+    for low, high in pairwise(line):
         slope = np.hypot(*(high - low))
         out, up = (high[1] - low[1]) / slope, (low[0] - high[0]) / slope
         vertices, normals, uvs = [], [], []
@@ -214,3 +214,20 @@ def drape(centre: Vector, width: float, height: float, material: str, label: int
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     uvs = np.stack([s * width * 1.6, t * height], -1).reshape(-1, 2)
     return Part(vertices + np.asarray(centre), normals, uvs, _lattice(rows, columns)[:, ::-1], material, label)
+
+
+def leaf(length: float, width: float, rise: float, material: str, label: int) -> Part:
+    """A leaf that grows from the origin along +x, rises and hangs over; it is seen from both sides."""
+    s = np.linspace(0.0, 1.0, 7)
+    height = length * (rise + 0.5) * 2.4 * (s - s**2)
+    half = 0.5 * width * np.sin(np.pi * (0.06 + 0.94 * s)) ** 0.8
+    edges = [np.stack([length * s, side * half, height], -1) for side in (-1, 1)]
+    slope = (rise + 0.5) * 2.4 * (1 - 2 * s)
+    normals = np.stack([-slope, np.zeros_like(s), np.ones_like(s)], -1)
+    normals = np.tile(normals / np.linalg.norm(normals, axis=1, keepdims=True), (2, 1))
+    vertices = np.concatenate(edges)
+    triangles = _lattice(2, len(s))
+    upper = Part(vertices, normals, vertices[:, :2].copy(), triangles, material, label)
+    # The underside lies a little lower, or rays could not choose.
+    lower = replace(upper, vertices=vertices - 1e-3 * normals, normals=-normals, triangles=triangles[:, ::-1])
+    return _joined([upper, lower])

@@ -1,4 +1,4 @@
-"""The furnished scenes: a house of four rooms and a corridor, one room alone, and two rooms that look alike."""
+"""The rooms with all that stands in them. ``moved`` gives them after some things were moved or taken away."""
 
 from semslam.datasets.synthetic import fittings, furniture, labels
 from semslam.datasets.synthetic.catalog import stream
@@ -76,8 +76,11 @@ def living_room(seed: int, moved: bool) -> Room:
     return room
 
 
-def study(seed: int, moved: bool, archway: bool = True) -> Room:
-    """Desk, bookcases, whiteboard, boxes; 4.1 x 4.0 m; an archway in W unless it is walled up, a door in N."""
+def study(seed: int, moved: bool, archway: bool = True, twin: bool = False) -> Room:
+    """Desk, bookcases, whiteboard, boxes; 4.1 x 4.0 m; an archway in W unless it is walled up, a door in N.
+
+    Its ``twin`` differs in little: the chair is turned, a picture is another one, a box and a vase are missing.
+    """
     room = Room(4.1, 4.0)
     openings = [add_window(room, "E", 1.7, 1.5), door_opening("N", 3.1)]
     if archway:
@@ -89,23 +92,24 @@ def study(seed: int, moved: bool, archway: bool = True) -> Room:
     room.against("E", 1.15, *fittings.table_lamp("shade", "metal"), out=0.3, z=0.74)
     room.against("E", 2.3, fittings.book_row(stream(seed, "desk"), 0.3, 0.3, "spines_1", "linen"), out=0.1, z=0.74)
     room.against("E", 1.6, [sheet((0, 0, 0.002), 0.3, 0.21, "poster_1", labels.PAPER)], out=0.6, z=0.742)
-    yaw = 40 if moved else 80
-    room.stand(2.75, 1.6, furniture.office_chair("cloth_black", "dark"), yaw=yaw - 180)
+    yaw = -140 if moved else -100
+    room.stand(2.75, 1.6, furniture.office_chair("cloth_black", "dark"), yaw=yaw + 25 * twin)
     for k, x in enumerate((0.62, 1.72)):
         books = fittings.bookcase(
             stream(seed, f"study_{k}"), 1.05, 2.1, "white_wood", f"spines_{1 + k}", "linen", PROPS
         )
         room.against("S", x, books)
     room.against("S", 2.85, furniture.cupboard(0.8, 0.42, 1.05, "cherry", "cherry", labels.CABINET, 1, 4))
-    room.against("S", 2.85, fittings.trinket(stream(seed, "vase"), ("ceramic",), 0.35), out=0.2, z=1.05)
+    if not twin:
+        room.against("S", 2.85, fittings.trinket(stream(seed, "vase"), ("ceramic",), 0.35), out=0.2, z=1.05)
     add_picture(room, "S", 2.9, 1.85, (0.55, 0.7), "poster_2", "dark_wood")
     room.against("N", 1.35, fittings.pinned(1.5, 0.95, "poster_3", labels.WHITEBOARD), z=1.5)
     add_picture(room, "W", 1.1, 1.65, (0.8, 1.05), "painting_7", "oak")
-    add_picture(room, "E", 3.3, 1.6, (0.6, 0.8), "painting_8", "white_wood")
+    add_picture(room, "E", 3.3, 1.6, (0.6, 0.8), "painting_12" if twin else "painting_8", "white_wood")
     add_picture(room, "E", 0.4, 1.6, (0.45, 0.6), "painting_9", "white_wood")
     stack = (0.35, 1.35) if moved else (0.35, 0.95)
     room.stand(*stack, fittings.carton_box(0.5, 0.4, 0.36, "carton"), yaw=-84)
-    if not moved:
+    if not (moved or twin):
         room.stand(0.42, 0.95, fittings.carton_box(0.36, 0.3, 0.26, "carton"), yaw=-100, z=0.36)
     room.against(
         "N", 2.25, [soft_box((0, 0.14, 0.2), (0.36, 0.2, 0.4), "cloth_green", labels.BAG, 0.08, 0.02)], out=0.05

@@ -1,0 +1,89 @@
+"""The camera's way through the scenes: where it passes, and where it looks."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+
+@dataclass(frozen=True, slots=True)
+class Stop:
+    """A place on the camera's way.
+
+    Attributes:
+        x: metres.
+        y: metres.
+        yaw: degrees in which it looks, counter-clockwise from +x; not wrapped, so that it tells the turn's sense.
+        pitch: degrees, positive upwards.
+    """
+
+    x: float
+    y: float
+    yaw: float
+    pitch: float = -10.0
+
+
+@dataclass(frozen=True, slots=True)
+class Route:
+    """A way that returns to its start.
+
+    Attributes:
+        stops: the first pass; the last stop is the first one again, but for whole turns.
+        again: how many of them the second pass follows.
+    """
+
+    stops: tuple[Stop, ...]
+    again: int
+
+    def both_passes(self) -> list[Stop]:
+        """All stops of the first and the second pass, the turn's sense kept."""
+        turns = round((self.stops[-1].yaw - self.stops[0].yaw) / 360.0) * 360.0
+        return [*self.stops, *(replace(stop, yaw=stop.yaw + turns) for stop in self.stops[1 : self.again])]
+
+
+def shifted(stops: Sequence[Stop], x: float, y: float) -> tuple[Stop, ...]:
+    """The same stops elsewhere."""
+    return tuple(replace(stop, x=stop.x + x, y=stop.y + y) for stop in stops)
+
+
+HOUSE = Route(
+    (
+        Stop(3.3, 2.6, 185), Stop(2.85, 2.4, 222), Stop(2.9, 1.5, 268), Stop(3.3, 1.6, 320), Stop(3.9, 2.5, 358),
+        Stop(4.7, 2.95, 360), Stop(5.5, 3.0, 350), Stop(6.2, 2.9, 318), Stop(6.9, 2.5, 284), Stop(7.1, 2.4, 340),
+        Stop(7.3, 2.6, 400), Stop(8.1, 3.1, 446), Stop(8.6, 3.7, 450), Stop(8.6, 4.5, 462), Stop(8.3, 4.85, 530),
+        Stop(7.4, 4.85, 540), Stop(6.3, 4.85, 532), Stop(5.7, 5.1, 470), Stop(5.6, 5.7, 450), Stop(5.65, 6.5, 420),
+        Stop(6.0, 7.4, 395), Stop(6.8, 8.05, 350), Stop(7.4, 8.1, 300), Stop(6.9, 8.05, 230), Stop(6.0, 7.6, 196),
+        Stop(5.65, 6.7, 255), Stop(5.6, 5.8, 270), Stop(5.5, 5.1, 230), Stop(4.9, 4.85, 182), Stop(3.9, 4.85, 160),
+        Stop(3.3, 5.1, 104), Stop(3.2, 5.8, 92), Stop(3.15, 6.4, 120), Stop(3.0, 7.0, 160), Stop(3.0, 7.5, 186),
+        Stop(2.9, 7.7, 222), Stop(2.75, 7.5, 250), Stop(2.85, 7.0, 268), Stop(3.2, 6.3, 276), Stop(3.2, 5.6, 272),
+        Stop(3.45, 4.95, 310), Stop(4.05, 4.75, 294), Stop(4.3, 4.1, 270), Stop(4.25, 3.4, 248), Stop(3.8, 2.9, 210),
+        Stop(3.3, 2.6, 185),
+    ),
+    again=23,
+)  # fmt: skip
+"""Through the living room, the study, the corridor, the kitchen and the bedroom; then again to the kitchen."""
+
+_STUDY_TOUR = (
+    Stop(3.1, 3.3, 250), Stop(2.5, 2.7, 232), Stop(1.9, 2.5, 262), Stop(1.8, 2.3, 300), Stop(1.9, 2.3, 345),
+    Stop(2.2, 2.5, 395), Stop(2.8, 3.0, 440), Stop(3.1, 3.5, 450),
+)  # fmt: skip
+TWIN_CORNERS = ((1.2, 0.0), (5.5, 0.0))
+"""Where the twin rooms stand."""
+TWINS = Route(
+    (
+        *shifted(_STUDY_TOUR, *TWIN_CORNERS[0]),
+        Stop(4.35, 4.85, 410), Stop(6.4, 4.9, 360), Stop(8.2, 4.85, 320), Stop(8.6, 4.2, 270),
+        *shifted(_STUDY_TOUR, *TWIN_CORNERS[1]),
+        Stop(8.5, 4.85, 500), Stop(6.4, 4.9, 540), Stop(4.7, 4.85, 590), Stop(4.3, 4.2, 625),
+        replace(_STUDY_TOUR[0], x=_STUDY_TOUR[0].x + TWIN_CORNERS[0][0], yaw=610),
+    ),
+    again=len(_STUDY_TOUR),
+)  # fmt: skip
+"""The same tour in both rooms, back into the first, and there a second time."""
+
+ROOM = Route(
+    (
+        Stop(2.9, 2.9, 250), Stop(2.4, 2.7, 232), Stop(1.9, 2.5, 262), Stop(1.8, 2.3, 300), Stop(1.9, 2.3, 345),
+        Stop(2.1, 2.4, 395), Stop(2.5, 2.6, 440), Stop(2.7, 2.6, 500), Stop(2.9, 2.9, 560), Stop(2.9, 2.9, 610),
+    ),
+    again=7,
+)  # fmt: skip
+"""Once around in one room."""
