@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from eval.loop_truth import LoopJudgement, LoopTruth, find_loop_truth, judge_loops, make_view, overlap_between
 from semslam.camera import Intrinsics
+from semslam.datasets import open_dataset
 from semslam.geometry import Float32Array, FloatArray, exp_so3, invert, make_transform, rotation_angle
 from semslam.types import Cloud, Features, Keyframe, LoopCandidate, LoopConstraint, Trajectory
 
@@ -148,8 +149,7 @@ def test_overlap_does_not_depend_on_the_world_frame(seed: int) -> None:
     [("redkitchen", 2591, 2683), ("rgbd_dataset_freiburg1_rpy_first10s", 85, 88)],
 )
 def test_real_sequences_have_the_known_number_of_pairs(shared: Path, sequence: str, true: int, false: int) -> None:
-    opening = pytest.importorskip("semslam.datasets.opening")
-    dataset = opening.open_dataset(shared / "data" / sequence)
+    dataset = open_dataset(shared / "data" / sequence)
     frames = [dataset.frame(index) for index in range(0, len(dataset), 5)]
     views = [make_view(frame.depth, frame.intrinsics) for frame in frames]
     found = find_loop_truth([frame.timestamp for frame in frames], views, dataset.ground_truth)

@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from eval.trajectory import align, associate, coverage, poses_at, position_errors, score_trajectory
+from semslam.datasets.tum_format import read_trajectory
 from semslam.errors import TrajectoryError
 from semslam.geometry import exp_so3, make_transform, rotation_angle
 from semslam.types import FloatArray, Trajectory
@@ -56,10 +57,9 @@ def moved(trajectory: Trajectory, T: FloatArray, scale: float = 1.0) -> Trajecto
     ],
 )
 def test_published_trajectories_give_their_known_error(shared: Path, sequence: str, system: str, ate: str) -> None:
-    tum_format = pytest.importorskip("semslam.datasets.tum_format")
     folder = shared / "data" / "tum_trajectories"
-    estimate, _ = tum_format.read_trajectory(folder / f"{sequence}-{system}.txt")
-    truth, _ = tum_format.read_trajectory(folder / f"{sequence}-groundtruth.txt")
+    estimate, _ = read_trajectory(folder / f"{sequence}-{system}.txt")
+    truth, _ = read_trajectory(folder / f"{sequence}-groundtruth.txt")
     decimals = len(ate.partition(".")[2])
     assert f"{score_trajectory(estimate, truth).ate_rmse_m:.{decimals}f}" == ate
 
