@@ -23,7 +23,7 @@ from semslam.ledger import LedgerEntry
 from semslam.map_cloud import write_map
 from semslam.metrics import Metrics
 from semslam.pipeline import RunResult
-from semslam.presentation import write_plots
+from semslam.presentation import present
 from semslam.types import Trajectory
 
 
@@ -83,8 +83,7 @@ def write_run(result: RunResult, dataset: Dataset, directory: Path, plots: bool 
         write_g2o(work / "graph.g2o", result.slam.solution)
         write_map(work / "map.ply", result.slam)
         if plots:
-            write_plots(result, work / "plots")
-            pass
+            present(result, dataset, work)
 
 
 def check_writable(directory: Path) -> None:
