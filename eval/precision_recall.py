@@ -30,6 +30,20 @@ class Scorer(Protocol):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Contestant:
+    """A detector twice, both fresh.
+
+    Attributes:
+        exhaustive: set to name every pair it can (``loops.max_candidates`` above the number of views and
+            ``loops.min_score`` 0), for the scores.
+        ordinary: set as it runs in earnest, for the time.
+    """
+
+    exhaustive: Scorer
+    ordinary: Scorer
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class DetectorScores:
     """A detector's answers on one sequence.
 
@@ -79,30 +93,28 @@ class DetectorQuality:
 
 
 def collect_scores(
-    detectors: Mapping[str, Scorer], views: Iterable[KeyframeView], clock: Callable[[], float] = time.perf_counter
+    contestants: Mapping[str, Contestant], views: Iterable[KeyframeView], clock: Callable[[], float] = time.perf_counter
 ) -> dict[str, DetectorScores]:
     """Hand each view to every detector, first as a query, then to be remembered.
 
-    For a whole precision-recall curve the detectors must be set to name every pair they can
-    (``loops.max_candidates`` above the number of views and ``loops.min_score`` 0); pairs they refuse score 0.
-
     Args:
-        detectors: fresh detectors by name.
+        contestants: detectors by name; pairs that they do not name score 0.
         views: keyframes in order; only one is held at a time.
         clock: seconds.
     """
-    found: dict[str, list[tuple[int, int, float]]] = {name: [] for name in detectors}
-    spent: dict[str, list[float]] = {name: [] for name in detectors}
+    found: dict[str, list[tuple[int, int, float]]] = {name: [] for name in contestants}
+    spent: dict[str, list[float]] = {name: [] for name in contestants}
     rows: dict[int, int] = {}
     for view in views:
         row = rows[view.keyframe.id] = len(rows)
-        for name, detector in detectors.items():
+        for name, contestant in contestants.items():
             start = clock()
-            candidates = detector.query(view)
+            contestant.ordinary.query(view)
             spent[name].append(1000.0 * (clock() - start))
-            found[name] += [(row, rows[candidate.match], candidate.score) for candidate in candidates]
-            detector.add(view)
-    return {name: DetectorScores(_matrix(found[name], len(rows)), np.array(spent[name])) for name in detectors}
+            found[name] += [(row, rows[c.match], c.score) for c in contestant.exhaustive.query(view)]
+            contestant.ordinary.add(view)
+            contestant.exhaustive.add(view)
+    return {name: DetectorScores(_matrix(found[name], len(rows)), np.array(spent[name])) for name in contestants}
 
 
 def precision_recall(labels: BoolArray, scores: FloatArray) -> Curve:

@@ -8,6 +8,7 @@ from sklearn.metrics import average_precision_score
 
 from eval.loop_truth import LoopTruth
 from eval.precision_recall import (
+    Contestant,
     DetectorScores,
     average_precision,
     collect_scores,
@@ -96,7 +97,9 @@ def view(identity: int) -> KeyframeView:
 
 def test_scores_are_collected_by_row_and_refusals_are_zero() -> None:
     ticks = iter(np.arange(100) / 1000)
-    found = collect_scores({"recorder": Recorder()}, (view(10 + i) for i in range(4)), lambda: float(next(ticks)))
+    found = collect_scores(
+        {"recorder": Contestant(Recorder(), Recorder())}, (view(10 + i) for i in range(4)), lambda: float(next(ticks))
+    )
     expected = np.zeros((4, 4))
     expected[2, 0], expected[3, 1] = 0.10, 0.11
     assert np.allclose(found["recorder"].scores, expected)
