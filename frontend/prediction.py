@@ -21,6 +21,15 @@ class ConstantVelocity:
         self._tracked_at = -np.inf
         self._velocity = np.zeros(6)
 
+    @property
+    def velocity(self) -> FloatArray:
+        """Angular and linear velocity (6,), radians and metres a second, at the last tracked frame."""
+        return self._velocity
+
+    def seconds_since_last(self, timestamp: float) -> float:
+        """Seconds from the last frame, tracked or not."""
+        return 0.0 if self._timestamp is None else timestamp - self._timestamp
+
     def predict(self, timestamp: float) -> FloatArray:
         """Motion T_prev_cur (4, 4) from the last frame to one at ``timestamp`` seconds."""
         if self._timestamp is None or timestamp - self._tracked_at > COAST_SECONDS:

@@ -15,6 +15,7 @@ from typing import Any
 from semslam.errors import ConfigError
 
 ODOMETRIES: dict[str, str] = {
+    "feature_map": "frontend.feature_map:FeatureMapOdometry",
     "feature": "frontend.feature:FeatureOdometry",
     "dense": "frontend.dense:DenseOdometry",
     "kiss": "frontend.kiss:KissOdometry",

@@ -90,8 +90,11 @@ def point_jacobians(points_cam: FloatArray, camera: Intrinsics) -> FloatArray:
 def pose_jacobians(J_point: FloatArray, points_cam: FloatArray) -> FloatArray:
     """Derivative (N, 3, 6) by the pose's right tangent: T_ref_cam Exp(xi) moves a camera-frame point by p x w - v."""
     J = np.empty((len(points_cam), 3, 6))
-    # Rows of J_point times the matrix [p]x, written as a cross product: a [p]x = a x p.
-    J[:, :, :3] = np.cross(J_point, points_cam[:, None, :])
+    x, y, z = points_cam.T[:, :, None]
+    # Rows of J_point times the matrix [p]x, which is the cross product of each row with p.
+    J[:, :, 0] = J_point[:, :, 1] * z - J_point[:, :, 2] * y
+    J[:, :, 1] = J_point[:, :, 2] * x - J_point[:, :, 0] * z
+    J[:, :, 2] = J_point[:, :, 0] * y - J_point[:, :, 1] * x
     J[:, :, 3:] = -J_point
     return J
 
@@ -114,7 +117,7 @@ def refine_pose(
     seen: Measurements,
     camera: Intrinsics,
     gate: float,
-    rounds: int = 3,
+    rounds: int = 2,
     steps: int = 3,
 ) -> PoseEstimate | None:
     """Minimise the robust reprojection error over the pose (Gauss-Newton, Huber weights, outliers dropped by rounds).
@@ -145,7 +148,7 @@ def refine_pose(
             if step is None:
                 return None
             T = retract(T, step)
-            if np.abs(step).max() < 1e-6:
+            if np.abs(step).max() < 1e-5:
                 break
         errors = squared_errors(T, points_ref, seen, camera)
         kept = errors <= gate

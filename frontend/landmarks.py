@@ -1,0 +1,108 @@
+"""Points of the map: where they are, how they look, and how often they were met again."""
+
+import numpy as np
+import numpy.typing as npt
+
+from semslam.types import FloatArray, IntArray, UInt8Array
+
+NONE = -1
+"""In place of a landmark's identity: a keypoint that belongs to none."""
+
+
+class Landmarks:
+    """Landmarks by identity: rows of arrays that grow; an identity is never used twice.
+
+    Attributes:
+        positions: (M, 3) metres, in their map's frame.
+        descriptors: (M, 32) uint8.
+        directions: (M, 3) unit vectors from the camera that first saw each to it.
+        reach: (M,) distance in metres at which each would be seen in the finest pyramid level.
+        born: (M,) id of the keyframe that made each.
+        visible: (M,) how often each should have been seen.
+        found: (M,) how often it was.
+        alive: (M,) bool.
+    """
+
+    def __init__(self) -> None:
+        self._count = 0
+        self._positions = np.zeros((1024, 3))
+        self._descriptors = np.zeros((1024, 32), dtype=np.uint8)
+        self._directions = np.zeros((1024, 3))
+        self._reach = np.zeros(1024)
+        self._born = np.zeros(1024, dtype=np.int64)
+        self._visible = np.zeros(1024, dtype=np.int64)
+        self._found = np.zeros(1024, dtype=np.int64)
+        self._alive = np.zeros(1024, dtype=bool)
+
+    def __len__(self) -> int:
+        return self._count
+
+    @property
+    def positions(self) -> FloatArray:
+        """(M, 3) metres; may be written."""
+        return self._positions[: self._count]
+
+    @property
+    def descriptors(self) -> UInt8Array:
+        """(M, 32) uint8; may be written."""
+        return self._descriptors[: self._count]
+
+    @property
+    def directions(self) -> FloatArray:
+        """(M, 3) unit vectors; may be written."""
+        return self._directions[: self._count]
+
+    @property
+    def reach(self) -> FloatArray:
+        """(M,) metres; may be written."""
+        return self._reach[: self._count]
+
+    @property
+    def born(self) -> IntArray:
+        """(M,) keyframe ids."""
+        return self._born[: self._count]
+
+    @property
+    def visible(self) -> IntArray:
+        """(M,) counts; may be written."""
+        return self._visible[: self._count]
+
+    @property
+    def found(self) -> IntArray:
+        """(M,) counts; may be written."""
+        return self._found[: self._count]
+
+    @property
+    def alive(self) -> npt.NDArray[np.bool_]:
+        """(M,) bool; may be written."""
+        return self._alive[: self._count]
+
+    def add(
+        self,
+        positions: FloatArray,
+        descriptors: UInt8Array,
+        directions: FloatArray,
+        reach: FloatArray,
+        keyframe: int,
+    ) -> IntArray:
+        """Make landmarks; gives their identities (N,)."""
+        first, self._count = self._count, self._count + len(positions)
+        self._grow()
+        rows = slice(first, self._count)
+        self._positions[rows] = positions
+        self._descriptors[rows] = descriptors
+        self._directions[rows] = directions
+        self._reach[rows] = reach
+        self._born[rows] = keyframe
+        self._visible[rows] = self._found[rows] = 1
+        self._alive[rows] = True
+        return np.arange(first, self._count)
+
+    def _grow(self) -> None:
+        if self._count <= len(self._positions):
+            return
+        for name in ("positions", "descriptors", "directions", "reach", "born", "visible", "found", "alive"):
+            old = getattr(self, f"_{name}")
+            new = np.zeros((2 * self._count, *old.shape[1:]), dtype=old.dtype)
+            new[: len(old)] = old
+            setattr(self, f"_{name}", new)

@@ -1,0 +1,108 @@
+"""Rolling shutter: the rows of an image are exposed one after another, and the camera moves meanwhile.
+
+A Kinect's colour camera takes about 26 ms from its first row to its last. At 100 degrees a second that bends the image
+by more than 20 pixels, which no rigid pose explains. Keypoints are moved to where they would have been had all rows
+been exposed with the principal point's row, from the velocity between frames; the read-out time is estimated.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from semslam.geometry import log_so3
+from semslam.reprojection import Measurements, point_jacobians, pose_jacobians, project_stereo
+from semslam.types import Features, FloatArray, Intrinsics
+
+FASTEST = 0.04
+"""Seconds; no read-out is longer than a frame at 25 Hz."""
+FORGET = 0.97
+"""What a frame's say in the estimate keeps at the next frame."""
+
+TRUST = 1e-2
+"""Landmarks were themselves made with the read-out believed so far, so that a frame says less than its residuals."""
+
+
+def velocity_of(T_prev_cur: FloatArray, seconds: float) -> FloatArray:
+    """Angular and linear velocity (6,) of a camera that moved by T_prev_cur (4, 4) in a time."""
+    return np.concatenate([log_so3(T_prev_cur[:3, :3]), T_prev_cur[:3, 3]]) / max(seconds, 1e-3)
+
+
+def rectify(features: Features, camera: Intrinsics, velocity: FloatArray, readout: float) -> Features:
+    """Move keypoints to where a global shutter would have seen them.
+
+    Args:
+        features: keypoints, undistorted.
+        camera: the camera.
+        velocity: (6,) angular and linear, radians and metres a second, in the camera's frame.
+        readout: seconds from the first row to the last.
+    """
+    if readout == 0 or not len(features):
+        return features
+    rays = np.column_stack(
+        [(features.pixels - (camera.cx, camera.cy)) / (camera.fx, camera.fy), np.ones(len(features))]
+    )
+    delay = readout * (features.pixels[:, 1] - camera.cy) / camera.height
+    seen = features.depths > 0
+    inverse_depths = np.where(seen, 1.0 / np.where(seen, features.depths, 1.0), 0.0)
+    rays += delay[:, None] * (np.cross(velocity[:3], rays) + velocity[3:] * inverse_depths[:, None])
+    depths = features.depths * rays[:, 2]
+    return replace(
+        features,
+        pixels=camera.project(rays).astype(np.float32),
+        depths=depths.astype(np.float32),
+        points=(rays * features.depths[:, None]).astype(np.float32),
+    )
+
+
+class ReadoutEstimate:
+    """The read-out time, from how residuals grow with a row's delay and the camera's velocity."""
+
+    def __init__(self, seconds: float, sigma: float) -> None:
+        self._prior = seconds
+        self._prior_weight = 1.0 / sigma**2 if sigma > 0 else np.inf
+        self._weight = 0.0
+        self._sum = 0.0
+
+    @property
+    def seconds(self) -> float:
+        """The estimate, between none and ``FASTEST``."""
+        if np.isinf(self._prior_weight):
+            return self._prior
+        mean = (self._prior * self._prior_weight + self._sum) / (self._prior_weight + self._weight)
+        return float(np.clip(mean, 0.0, FASTEST))
+
+    def learn(
+        self,
+        points_cam: FloatArray,
+        rectified: Measurements,
+        pixels_v: FloatArray,
+        camera: Intrinsics,
+        velocity: FloatArray,
+        used: float,
+    ) -> None:
+        """Take in a tracked frame.
+
+        Args:
+            points_cam: (N, 3) landmarks in the camera's frame, of inliers.
+            rectified: (N,) what was measured of them, rectified with the read-out ``used``.
+            pixels_v: (N,) their rows.
+            camera: the camera.
+            velocity: (6,) of the camera.
+            used: the read-out that was used, seconds.
+        """
+        delay = (pixels_v - camera.cy) / camera.height
+        J_point = point_jacobians(points_cam, camera)
+        moved = np.cross(velocity[:3], points_cam) + velocity[3:]
+        # One more second of read-out moves the rectified pixel by this much.
+        slope = (J_point @ moved[:, :, None])[:, :, 0] * delay[:, None]
+        weights = rectified.weights.copy()
+        weights[:, 2] = 0.0
+        residual = project_stereo(points_cam, camera) - rectified.stereo
+        J = pose_jacobians(J_point, points_cam).reshape(-1, 6)
+        JW = J * weights.reshape(-1, 1)
+        # The pose has taken up what it could of the effect: only what is left of the slope speaks.
+        left = slope.reshape(-1) - J @ np.linalg.solve(JW.T @ J + 1e-9 * np.eye(6), JW.T @ slope.reshape(-1))
+        weighted = left * weights.reshape(-1)
+        information = float(weighted @ left) * TRUST
+        self._weight = FORGET * self._weight + information
+        self._sum = FORGET * self._sum + float(weighted @ residual.reshape(-1)) * TRUST + information * used
