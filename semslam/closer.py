@@ -12,6 +12,7 @@ from backend.factors import between_factor
 from backend.products import Edge, loop_edge
 from frontend.keyframes import make_keyframe
 from loop.detector import LoopDetector
+from loop.segmentation.build import build_segmenter
 from loop.segmentation.segmenter import Segmenter
 from loop.verification import IcpVerifier, LoopVerifier
 from semslam import plugins
@@ -81,8 +82,7 @@ class LoopCloser:
         self._detector = self._chosen(detector or self._config.detector)
         self._segmenter: Segmenter | None = None
         if self._detector.needs_labels:
-            name = self._config.segmentation.name
-            self._segmenter = plugins.load("semslam.segmenters", name).from_config(self._config)
+            self._segmenter = build_segmenter(self._config)
         self._verifier = verifier or IcpVerifier.from_config(self._config)
         self._extractor = FeatureExtractor(self._config.features)
         self._keys: list[int] = []
