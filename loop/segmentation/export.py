@@ -92,4 +92,5 @@ def write_int8(network: DeepLab, path: Path, images: Iterable[UInt8Array]) -> No
         quantize_static(
             str(prepared), str(path), _Photos(images), quant_format=QuantFormat.QDQ, per_channel=True,
             activation_type=QuantType.QUInt8, weight_type=QuantType.QInt8, calibrate_method=CalibrationMethod.MinMax,
+            extra_options={"CalibMovingAverage": True},
         )  # fmt: skip
