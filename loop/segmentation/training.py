@@ -147,7 +147,7 @@ class _Run:
         with _mixed_precision():
             logits, _ = self.network(images.contiguous(memory_format=torch.channels_last))
         target = labels[:, LOSS_STRIDE // 2 :: LOSS_STRIDE, LOSS_STRIDE // 2 :: LOSS_STRIDE]
-        loss = F.cross_entropy(logits.float(), target, weight=self.weights, ignore_index=-1)
+        loss = _weighted_loss(logits.float(), target, self.weights)
         self.optimizer.zero_grad(set_to_none=True)
         loss.backward()  # type: ignore[no-untyped-call]
         torch.nn.utils.clip_grad_norm_(self.network.parameters(), 5.0)
@@ -214,6 +214,12 @@ class _Run:
             raise ModelError(f"The training state {path} is damaged; remove it to start afresh.") from error
         if steps != self.steps:
             raise ModelError(f"The training in {self.out} was begun with other settings; choose another folder.")
+
+
+def _weighted_loss(logits: Tensor, target: Tensor, weights: Tensor) -> Tensor:
+    """Weighted mean cross-entropy over the pixels that are not void; 0 where all are."""
+    total = weights[target[target >= 0]].sum().clamp(min=1e-6)
+    return F.cross_entropy(logits, target, weight=weights, ignore_index=-1, reduction="sum") / total
 
 
 def _optimizer(network: DeepLab, settings: TrainingConfig) -> torch.optim.AdamW:
