@@ -25,6 +25,8 @@ DETECTORS: dict[str, str] = {
     "semantic": "loop.semantic:SemanticDetector",
     "semantic-paper": "loop.semantic:PaperSemanticDetector",
     "dbow": "loop.dbow:DbowDetector",
+    "sda": "loop.sda:SdaDetector",
+    "cnnw": "loop.cnnw:CnnwDetector",
     "conv3": "loop.conv3:Conv3Detector",
     "thumbnail": "loop.thumbnail:ThumbnailDetector",
     "hog": "loop.hog:HogDetector",
