@@ -97,7 +97,10 @@ def _neighbours(loops: Sequence[Edge]) -> list[tuple[int, int]]:
 def _smallest_scale(
     left: FloatArray, fixed: FloatArray, scaled: FloatArray, limit: float, percentile: float, expected: float
 ) -> float:
-    """Smallest factor on ``scaled``'s deviations that brings a percentile of the squared distances down to chance."""
+    """Smallest factor on ``scaled``'s deviations that brings a percentile of the squared distances down to chance.
+
+    Where even ``limit`` does not, 1: then it is the loops that are wrong, such as those between rooms that look alike.
+    """
     if len(left) < QUORUM:
         return 1.0
 
@@ -105,7 +108,7 @@ def _smallest_scale(
         distances = squared_mahalanobis(left, fixed + scale**2 * scaled)
         return bool(np.percentile(distances, percentile) <= expected)
 
-    if limit <= TOLERANCE or fits(TOLERANCE):
+    if limit <= TOLERANCE or fits(TOLERANCE) or not fits(limit):
         return 1.0
     low, high = TOLERANCE, limit
     for _ in range(STEPS):

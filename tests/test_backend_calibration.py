@@ -102,6 +102,26 @@ def test_drift_that_odometry_does_not_state_is_found(seed):
     assert odometry_scale(chain, loops[:3], 10.0) == 1.0
 
 
+def test_loops_of_a_room_that_looks_alike_do_not_widen_odometry():
+    """All loops agree among themselves on a place metres away: no drift explains that."""
+    truth, rng = ring(80), np.random.default_rng(0)
+    edges = measure_odometry(truth, rng)
+    twin = make_transform(np.eye(3), [8.0, 0.0, 0.0])
+    false = [
+        Edge(e.from_key, e.to_key, invert(truth[e.from_key]) @ twin @ truth[e.from_key] @ e.T_from_to, e.covariance)
+        for e in loop_edges(truth, rng)[:15]
+    ]
+    assert odometry_scale(OdometryChain(range(80), edges), false, 10.0) == 1.0
+    graph = PoseGraph()
+    for key, pose in enumerate(compose([edge.T_from_to for edge in edges], truth[0])):
+        graph.add_keyframe(key, pose)
+    for edge in edges:
+        graph.add_odometry(edge.from_key, edge.to_key, edge.T_from_to, edge.covariance)
+    for edge in false:
+        graph.add_loop(constraint_of(edge))
+    assert not any(verdict.accepted for verdict in graph.optimize().verdicts)
+
+
 def test_loops_that_state_too_little_are_found():
     truth, rng = ring(80), np.random.default_rng(0)
     chain, loops = OdometryChain(range(80), measure_odometry(truth, rng, 0.5)), loop_edges(truth, rng, 3.0)
