@@ -14,8 +14,8 @@ RELINEARIZE = 0.02
 """Radians and metres a pose must move before its factors are linearised again."""
 RELINEARIZE_EVERY = 10
 """Keyframes between two looks at who has moved; loops are followed at once."""
-SETTLING_STEPS = 2
-"""Further iSAM2 steps after a loop came or went."""
+SETTLING_STEPS = 3
+"""Further iSAM2 steps at the most after a loop came or went."""
 FIRST_RETRY, RETRY_SHARE = 5, 0.05
 """Waiting loops, and share of all loops, at which all are judged together; then again when they have doubled."""
 
@@ -44,6 +44,7 @@ class IncrementalPoseGraph:
         self._new: list[int] = []
         self._odometry_scale = self._loop_scale = 1.0
         self._retry_at = FIRST_RETRY
+        self._known_error: float | None = None  # new keyframes start on their odometry and add nothing to it
 
     @property
     def accepted(self) -> tuple[Pair, ...]:
@@ -142,13 +143,16 @@ class IncrementalPoseGraph:
             self._retry_at = max(FIRST_RETRY, 2 * len(self._waiting))
 
     def _try(self, constraint: LoopConstraint) -> None:
-        before = self._error()
+        if self._known_error is None:
+            self._known_error = self._error()
         factors = gtsam.NonlinearFactorGraph()
         factors.add(between_factor(loop_edge(constraint).widened(self._loop_scale)))
-        (slot,) = self._isam.update(factors, gtsam.Values()).getNewFactorsIndices()
+        (slot,) = self._isam.update(factors, gtsam.Values(), force_relinearize=True).getNewFactorsIndices()
         self._settle()
-        if 2 * (self._error() - before) <= self._config.max_residual**2:
+        error = self._error()
+        if 2 * (error - self._known_error) <= self._config.max_residual**2:
             self._slots[_pair(constraint)] = slot
+            self._known_error = error
         else:
             self._withdraw(slot)
             self._waiting[_pair(constraint)] = constraint
@@ -156,10 +160,13 @@ class IncrementalPoseGraph:
     def _withdraw(self, slot: int) -> None:
         self._isam.update(gtsam.NonlinearFactorGraph(), gtsam.Values(), [slot], force_relinearize=True)
         self._settle()
+        self._known_error = None
 
     def _settle(self) -> None:
         for _ in range(SETTLING_STEPS):
-            self._isam.update(gtsam.NonlinearFactorGraph(), gtsam.Values(), force_relinearize=True)
+            result = self._isam.update(gtsam.NonlinearFactorGraph(), gtsam.Values(), force_relinearize=True)
+            if result.getVariablesRelinearized() == 0:
+                break
 
     def _error(self) -> float:
         return float(self._isam.getFactorsUnsafe().error(self._isam.calculateEstimate()))
@@ -177,7 +184,7 @@ class IncrementalPoseGraph:
         for index, edge in enumerate(solution.edges):
             scale = self._odometry_scale if index < odometry else self._loop_scale
             graph.add(between_factor(edge.widened(scale)))
-        self._isam = _new_isam()
+        self._isam, self._known_error = _new_isam(), None
         slots = self._isam.update(graph, make_values(solution.poses)).getNewFactorsIndices()
         pairs = [_pair(verdict.constraint) for verdict in accepted]
         self._slots = dict(zip(pairs, slots[len(slots) - len(pairs) :], strict=True))
