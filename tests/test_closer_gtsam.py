@@ -156,6 +156,6 @@ def test_the_real_verification_finds_the_turn_before(room):
 @pytest.mark.parametrize("name", ["loop_closer_isam2", "loop_closer_batch"])
 def test_the_examples_close_their_loops(room, name, capsys):
     main = runpy.run_path(str(EXAMPLES / f"{name}.py"))["main"]
-    without, with_loops = main(FirstAgain())
+    without, with_loops = main()
     assert with_loops < 0.5 * without
     assert "loops" in capsys.readouterr().out
