@@ -1,12 +1,13 @@
 """The run folder, written and read."""
 
 import contextlib
+import csv
 import errno
 import json
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -24,7 +25,7 @@ from semslam.map_cloud import write_map
 from semslam.metrics import Metrics
 from semslam.pipeline import RunResult
 from semslam.presentation import present
-from semslam.types import Trajectory
+from semslam.types import Keyframe, Trajectory
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,6 +40,8 @@ class SavedRun:
         keyframes: optimised keyframe poses.
         ledger: one entry per loop candidate.
         metrics: all figures.
+        keyframe_stamps: seconds by keyframe id, of all maps.
+        ground_truth: the dataset's, or None.
     """
 
     directory: Path
@@ -48,6 +51,8 @@ class SavedRun:
     keyframes: Trajectory
     ledger: tuple[LedgerEntry, ...]
     metrics: Metrics
+    keyframe_stamps: dict[int, float]
+    ground_truth: Trajectory | None
 
 
 def new_run_directory(root: Path, sequence: str, detector: str) -> Path:
@@ -79,6 +84,9 @@ def write_run(result: RunResult, dataset: Dataset, directory: Path, plots: bool 
         write_trajectory(work / "odometry.txt", result.odometry)
         write_trajectory(work / "trajectory.txt", result.trajectory)
         write_trajectory(work / "keyframes.txt", _keyframe_trajectory(result))
+        (work / "keyframes.csv").write_text(_keyframe_table(result.slam.keyframes), encoding="utf-8")
+        if result.ground_truth is not None:
+            write_trajectory(work / "groundtruth.txt", result.ground_truth)
         write_ledger(work / "loops.jsonl", result.ledger)
         write_g2o(work / "graph.g2o", result.slam.solution)
         write_map(work / "map.ply", result.slam)
@@ -113,6 +121,7 @@ def read_run(directory: Path) -> SavedRun:
         metrics = Metrics.model_validate_json(metrics_file.read_text(encoding="utf-8"))
     except (ValidationError, UnicodeDecodeError) as error:
         raise ResultsError(f"{metrics_file} is damaged.") from error
+    truth_file = directory / "groundtruth.txt"
     return SavedRun(
         directory=directory,
         config=load_config(directory / "config.yaml"),
@@ -121,6 +130,8 @@ def read_run(directory: Path) -> SavedRun:
         keyframes=read_trajectory(directory / "keyframes.txt")[0],
         ledger=read_ledger(directory / "loops.jsonl"),
         metrics=metrics,
+        keyframe_stamps=_read_keyframe_table(directory / "keyframes.csv"),
+        ground_truth=read_trajectory(truth_file)[0] if truth_file.exists() else None,
     )
 
 
@@ -194,6 +205,19 @@ def _umask() -> int:
     mask = os.umask(0)
     os.umask(mask)
     return mask
+
+
+def _keyframe_table(keyframes: Sequence[Keyframe]) -> str:
+    rows = (f"{k.id},{k.frame_index},{k.timestamp:.9f},{k.map_id}\n" for k in keyframes)
+    return "id,frame,timestamp,map\n" + "".join(rows)
+
+
+def _read_keyframe_table(path: Path) -> dict[int, float]:
+    try:
+        with path.open(newline="", encoding="utf-8") as file:
+            return {int(row["id"]): float(row["timestamp"]) for row in csv.DictReader(file)}
+    except (OSError, KeyError, TypeError, ValueError) as error:
+        raise ResultsError(f"The list of keyframes {path} cannot be read.") from error
 
 
 def _keyframe_trajectory(result: RunResult) -> Trajectory:

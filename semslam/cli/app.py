@@ -7,7 +7,7 @@ import sys
 import typer
 
 from semslam import __version__
-from semslam.cli import environment, models, runs, scores
+from semslam.cli import environment, graphs, models, runs, scores
 from semslam.cli.console import complain
 from semslam.errors import SemslamError
 
@@ -37,7 +37,7 @@ def root(
     """RGB-D SLAM whose loop closures come from semantics."""
 
 
-for module in (runs, scores, models, environment):
+for module in (runs, scores, graphs, models, environment):
     for command in module.COMMANDS:
         app.command(command.name, help=command.help, epilog=command.epilog)(command.run)
 

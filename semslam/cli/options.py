@@ -5,6 +5,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from semslam.errors import ConfigError
+
 if TYPE_CHECKING:
     from semslam.config import Config
 
@@ -47,3 +49,19 @@ def settings(
         **{key: value for key, value in named.items() if value is not None},
         dataset={key: value for key, value in frames.items() if value is not None},
     )
+
+
+def detector_names(text: str) -> list[str]:
+    """Split names joined by commas.
+
+    Raises:
+        ConfigError: there is none, one stands there twice, or one is unknown.
+    """
+    from semslam.plugins import load
+
+    names = [name.strip() for name in text.split(",") if name.strip()]
+    if not names or len(set(names)) != len(names):
+        raise ConfigError("Name at least one detector, and each only once.")
+    for name in names:
+        load("semslam.detectors", name)
+    return names

@@ -9,7 +9,7 @@ import typer
 from semslam.cli import options
 from semslam.cli.command import Command, example
 from semslam.cli.console import bar, frame_progress, metrics_table, out, remark, remarks
-from semslam.errors import ConfigError, ResultsError
+from semslam.errors import ResultsError
 
 if TYPE_CHECKING:
     from semslam.config import Config
@@ -75,7 +75,7 @@ def compare_command(
     chosen = options.settings(config, overrides, odometry, None, seed, loader, start, max_frames, stride)
     dataset = open_dataset(sequence, config=chosen.dataset)
     directory = out_directory or new_run_directory(RUNS, dataset.name, "compare")
-    _compare(dataset, chosen, _names(detectors), directory, plots)
+    _compare(dataset, chosen, options.detector_names(detectors), directory, plots)
     if out_directory is None:
         link_latest(directory)
 
@@ -89,24 +89,13 @@ def demo_command(
 
     chosen = options.settings(None, None, seed=seed)
     dataset = open_dataset(DEMO_SEQUENCE, config=chosen.dataset)
-    alone, closed = _compare(dataset, chosen, _names(DEMO_DETECTORS), out_directory, plots=True)
+    alone, closed = _compare(dataset, chosen, options.detector_names(DEMO_DETECTORS), out_directory, plots=True)
     before, after = alone.optimized.ate_rmse_m, closed.optimized.ate_rmse_m
     if before is not None and after is not None:
         out.print(
             f"Semantic loops lower the ATE from {100 * before:.1f} to {100 * after:.1f} cm: {before / after:.1f}-fold."
         )
     out.print(f"Open {out_directory / 'semantic' / 'report.html'} to see every loop.", soft_wrap=True)
-
-
-def _names(text: str) -> list[str]:
-    from semslam.plugins import load
-
-    names = [name.strip() for name in text.split(",") if name.strip()]
-    if not names or len(set(names)) != len(names):
-        raise ConfigError("Name at least one detector, and each only once.")
-    for name in names:
-        load("semslam.detectors", name)
-    return names
 
 
 def _compare(

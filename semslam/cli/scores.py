@@ -1,6 +1,7 @@
 """semslam eval."""
 
 import json
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
@@ -9,7 +10,7 @@ from rich.table import Table
 
 from semslam.cli import options
 from semslam.cli.command import Command, example
-from semslam.cli.console import out, remarks
+from semslam.cli.console import bar, out, remarks
 
 
 def eval_command(
@@ -38,11 +39,57 @@ def eval_command(
     out.print(table)
 
 
+def loops_command(
+    sequence: options.Sequence,
+    detectors: Annotated[str, typer.Option("--detectors", help="Names joined by commas.")] = "semantic-paper,semantic",
+    every: Annotated[int, typer.Option(min=1, help="Frames from one keyframe to the next.")] = 5,
+    out_directory: Annotated[Path, typer.Option("--out", help="Folder for loops.json and the figure.")] = Path("loops"),
+    odometry: options.Odometry = None,
+    config: options.ConfigFile = None,
+    overrides: options.Settings = None,
+    start: options.Start = 0,
+    max_frames: options.MaxFrames = None,
+    loader: options.Loader = None,
+) -> None:
+    """Score loop detectors on a sequence by precision and recall."""
+    from eval.precision_recall import draw_curves
+    from semslam.datasets import open_dataset
+    from semslam.experiments import compare_detectors
+    from semslam.results import write_json, writing
+
+    chosen = options.settings(config, overrides, odometry, loader=loader, start=start, max_frames=max_frames)
+    names = options.detector_names(detectors)
+    dataset = open_dataset(sequence, chosen.dataset)
+    with writing(out_directory):
+        out_directory.mkdir(parents=True, exist_ok=True)
+    with bar(dataset.name, len(dataset)) as update:
+        comparison = compare_detectors(dataset, chosen, names, every, update)
+    write_json(out_directory / "loops.json", {"detectors": [asdict(quality) for quality in comparison.qualities]})
+    with writing(out_directory / "precision_recall.png"):
+        title = f"{dataset.name}, every {every}. frame"
+        (out_directory / "precision_recall.png").write_bytes(draw_curves(comparison.curves, title))
+    table = Table(title=f"{dataset.name}, every {every}. frame a keyframe", title_justify="left")
+    table.add_column("detector")
+    for heading in ("AP", "recall at 100 %", "recall at 99 %", "max F1", "recall@1", "ms"):
+        table.add_column(heading, justify="right")
+    for q in comparison.qualities:
+        figures = (q.average_precision, q.recall_at_100_precision, q.recall_at_99_precision, q.max_f1, q.recall_at_1)
+        table.add_row(q.detector, *("-" if f is None else f"{f:.3f}" for f in figures), f"{q.ms_per_query:.1f}")
+    out.print(table)
+    out.print(f"{q.true_pairs} true and {q.false_pairs} false pairs; results: {out_directory}", soft_wrap=True)
+
+
 COMMANDS = (
     Command(
         "eval",
         eval_command,
         "Score a trajectory against ground truth: ATE (SE(3) and Sim(3)), RPE, coverage.",
         example("semslam eval trajectory.txt groundtruth.txt", "semslam eval EST GT --json"),
+    ),
+    Command(
+        "loops",
+        loops_command,
+        "Score loop detectors on a sequence: precision-recall curves against view overlap (the paper's Figure 13).",
+        example("semslam loops SEQ --detectors semantic,dbow,conv3"),
     ),
 )

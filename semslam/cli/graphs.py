@@ -1,0 +1,145 @@
+"""semslam ledger, graph, stress."""
+
+import json
+from collections import Counter
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.table import Table
+
+from semslam.cli import options
+from semslam.cli.command import Command, example
+from semslam.cli.console import out, remark
+from semslam.errors import ConfigError
+
+if TYPE_CHECKING:
+    from semslam.ledger import LedgerEntry
+
+RunFolder = Annotated[Path, typer.Argument(help="A run folder.")]
+
+
+def ledger_command(
+    run: RunFolder,
+    verdict: Annotated[str | None, typer.Option(help="Only accepted, rejected or withdrawn ones.")] = None,
+    reason: Annotated[str | None, typer.Option(help="Only those that failed this test.")] = None,
+    truth: Annotated[str | None, typer.Option(help="Only true, inaccurate or false ones.")] = None,
+    as_json: options.Json = False,
+) -> None:
+    """Print the loop candidates of a run and what became of each."""
+    from semslam.ledger import Verdict
+    from semslam.results import read_ledger
+
+    if verdict is not None and verdict not in set(Verdict):
+        raise ConfigError(f"There is no verdict '{verdict}'. Known: {', '.join(Verdict)}.")
+    chosen = [
+        entry
+        for entry in read_ledger(run / "loops.jsonl")
+        if verdict in (None, entry.verdict)
+        and reason in (None, entry.reason)
+        and truth in (None, entry.truth and entry.truth.judgement)
+    ]
+    if as_json:
+        for entry in chosen:
+            typer.echo(entry.to_json())
+        return
+    out.print(_ledger_table(chosen))
+    counts = Counter(str(entry.reason or entry.verdict) for entry in chosen)
+    out.print(f"{len(chosen)} candidates: " + ", ".join(f"{n} {what}" for what, n in counts.most_common()))
+
+
+def graph_command(
+    file: Annotated[Path, typer.Argument(help="A g2o file with 3-D poses.")],
+    out_file: Annotated[Path | None, typer.Option("--out", help="Where the optimised graph goes.")] = None,
+    config: options.ConfigFile = None,
+    overrides: options.Settings = None,
+) -> None:
+    """Optimise a graph from elsewhere and judge its loops."""
+    from backend.g2o import read_g2o, write_g2o
+    from backend.judge import judge_graph
+
+    graph = read_g2o(file)
+    solution = judge_graph(graph, options.settings(config, overrides).backend)
+    accepted = sum(verdict.accepted for verdict in solution.verdicts)
+    out.print(f"{len(graph.poses)} poses, {len(graph.edges)} edges, {len(solution.components)} connected parts")
+    out.print(f"loops: {accepted} of {len(solution.verdicts)} accepted; cost {solution.cost:.6g}")
+    worst = sorted((v for v in solution.verdicts if not v.accepted), key=lambda v: -v.residual)
+    for v in worst[:20]:
+        pair = v.constraint.candidate
+        out.print(f"  refused: {pair.match} - {pair.query}, {v.residual:.1f} standard deviations off")
+    if out_file is not None:
+        write_g2o(out_file, solution)
+        out.print(f"Written to {out_file}", soft_wrap=True)
+
+
+def stress_command(
+    run: RunFolder,
+    false_loops: Annotated[float, typer.Option(min=0.0, max=0.95, help="Share of false ones among all loops.")] = 0.3,
+    kind: Annotated[str, typer.Option(help="random, or consistent among themselves.")] = "random",
+    backends: Annotated[str | None, typer.Option(help="Names joined by commas; default: all.")] = None,
+    seed: options.Seed = None,
+    as_json: options.Json = False,
+) -> None:
+    """Put false loops into a saved run's graph and show what each back end makes of them."""
+    from semslam.stress_test import stress_run
+
+    names = None if backends is None else [name.strip() for name in backends.split(",")]
+    rows = stress_run(run, false_loops, kind, seed or 0, names)
+    if as_json:
+        typer.echo(json.dumps({"backends": [row.model_dump() for row in rows]}))
+        return
+    table = Table(title=f"{run.name}: {100 * false_loops:.0f} % false loops, {kind}", title_justify="left")
+    for heading in ("back end", "ATE clean, cm", "ATE, cm", "true kept", "false kept"):
+        table.add_column(heading, justify="left" if heading == "back end" else "right")
+    for row in rows:
+        errors = ("-" if e is None else f"{100 * e:.2f}" for e in (row.ate_clean_m, row.ate_m))
+        table.add_row(row.name, *errors, f"{100 * row.true_kept:.0f} %", f"{100 * row.false_kept:.0f} %")
+    out.print(table)
+    if rows and rows[0].ate_m is None:
+        remark("The run has no ground truth file beside it; ATE is not known.")
+
+
+def _ledger_table(entries: "list[LedgerEntry]") -> Table:
+    table = Table()
+    for heading in ("query", "match", "seconds", "score", "verdict", "reason", "inliers", "fitness", "weight", "truth"):
+        table.add_column(heading, justify="left" if heading in ("verdict", "reason", "truth") else "right")
+    for e in entries:
+        reason = "" if e.reason is None else e.reason
+        if e.figure is not None:
+            reason += f" {e.figure:.3g} (limit {e.limit:.3g})"
+        error = "" if e.truth is None else f"{e.truth.judgement} {100 * e.truth.translation_m:.0f} cm"
+        table.add_row(
+            str(e.query),
+            str(e.match),
+            f"{e.query_time - e.match_time:.1f}",
+            f"{e.score:.3f}",
+            e.verdict.value,
+            reason,
+            "" if e.inliers is None else str(e.inliers),
+            "" if e.fitness is None else f"{e.fitness:.2f}",
+            "" if e.weight is None else f"{e.weight:.2f}",
+            error,
+        )
+    return table
+
+
+COMMANDS = (
+    Command(
+        "ledger",
+        ledger_command,
+        "Print the loop candidates of a run and what became of each.",
+        example("semslam ledger runs/latest", "semslam ledger RUN --verdict withdrawn", "semslam ledger RUN --json"),
+    ),
+    Command(
+        "graph",
+        graph_command,
+        "Optimise a g2o graph from elsewhere and judge its loops.",
+        example("semslam graph sphere.g2o", "semslam graph FILE.g2o --set backend.robust=dcs --out better.g2o"),
+    ),
+    Command(
+        "stress",
+        stress_command,
+        "Put false loops into a saved run's graph and show what each back end makes of them.",
+        example("semslam stress runs/latest --false-loops 0.3"),
+    ),
+)
