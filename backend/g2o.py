@@ -56,21 +56,18 @@ def read_g2o(path: Path) -> PosedGraph:
     anchors: list[int] = []
     for number, tag, words in _lines(path):
         where = f"Line {number} of {path.name}"
-        try:
-            figures = [float(word) for word in words]
-        except ValueError:
-            raise GraphError(f"{where} holds a word that is not a number.") from None
-        if len(figures) != FIELDS[tag]:
-            raise GraphError(f"{where} has {len(figures)} figures after {tag}, not {FIELDS[tag]}.")
+        if len(words) != FIELDS[tag]:
+            raise GraphError(f"{where} has {len(words)} figures after {tag}, not {FIELDS[tag]}.")
+        keys = [_key(word, where) for word in words[: 2 if tag.startswith("EDGE") else 1]]
+        figures = _figures(words[len(keys) :], where)
         if tag.startswith("VERTEX"):
-            key = _key(figures[0], where)
-            if key in poses:
-                raise GraphError(f"{where} gives keyframe {key} a second time.")
-            poses[key] = _pose(figures[1:], where)
+            if keys[0] in poses:
+                raise GraphError(f"{where} gives keyframe {keys[0]} a second time.")
+            poses[keys[0]] = _pose(figures, where)
         elif tag == "FIX":
-            anchors.append(_key(figures[0], where))
+            anchors += keys
         else:
-            edges.append(_edge(figures, where))
+            edges.append(_edge(keys[0], keys[1], figures, where))
     if not poses and not edges:
         raise GraphError(f"{path} holds no 3-D pose graph.")
     _chain(poses, edges)
@@ -90,10 +87,17 @@ def _lines(path: Path) -> Iterator[tuple[int, str, list[str]]]:
             yield number, tag, words
 
 
-def _key(figure: float, where: str) -> int:
-    if not figure.is_integer() or figure < 0:
-        raise GraphError(f"{where} has the key {figure}, not a whole number.")
-    return int(figure)
+def _key(word: str, where: str) -> int:
+    if not word.isdecimal():
+        raise GraphError(f"{where} has the key {word}, not a whole number.")
+    return int(word)
+
+
+def _figures(words: list[str], where: str) -> list[float]:
+    try:
+        return [float(word) for word in words]
+    except ValueError:
+        raise GraphError(f"{where} holds a word that is not a number.") from None
 
 
 def _pose(figures: list[float], where: str) -> FloatArray:
@@ -115,8 +119,7 @@ def _rotation_of_euler(roll: float, pitch: float, yaw: float) -> FloatArray:
     )
 
 
-def _edge(figures: list[float], where: str) -> Edge:
-    from_key, to_key = _key(figures[0], where), _key(figures[1], where)
+def _edge(from_key: int, to_key: int, figures: list[float], where: str) -> Edge:
     information = np.zeros((6, 6))
     information[TRIANGLE] = figures[-21:]
     information += np.triu(information, 1).T
@@ -124,7 +127,7 @@ def _edge(figures: list[float], where: str) -> Edge:
         covariance = np.linalg.inv(information)[np.ix_(SWAPPED, SWAPPED)]
     except np.linalg.LinAlgError:
         raise GraphError(f"{where} has an information matrix that cannot be inverted.") from None
-    T_from_to = _pose(figures[2:-21], where)
+    T_from_to = _pose(figures[:-21], where)
     return Edge(from_key, to_key, T_from_to, checked_covariance(covariance, where))
 
 

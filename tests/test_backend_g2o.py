@@ -106,6 +106,15 @@ def test_gtsams_example_graphs_have_the_cost_gtsam_gives_them(name):
     assert ours.error(start) == pytest.approx(factors.error(values), rel=1e-6, abs=1e-9)
 
 
+def test_keys_as_large_as_gtsams_symbols_keep_every_digit(tmp_path):
+    keys = [gtsam.symbol("x", 0), gtsam.symbol("x", 1)]
+    graph = PosedGraph(dict.fromkeys(keys, np.eye(4)), (Edge(keys[0], keys[1], np.eye(4), np.eye(6)),))
+    write_g2o(tmp_path / "graph.g2o", graph)
+    again = read_g2o(tmp_path / "graph.g2o")
+    assert sorted(again.poses) == keys
+    assert (again.edges[0].from_key, again.edges[0].to_key) == tuple(keys)
+
+
 def test_a_graph_of_edges_alone_is_chained(tmp_path):
     path = tmp_path / "edges.g2o"
     path.write_text(
