@@ -14,6 +14,8 @@ from backend.products import Edge
 
 BoolMatrix = npt.NDArray[np.bool_]
 
+PAIR_SLACK = 1.4
+"""How much farther than a single loop a cycle may be off: a true loop must close one with every other."""
 EXACT_STEPS = 20_000
 """Branches after which the search is content with the best set found."""
 BLOCK = 50_000
@@ -29,7 +31,7 @@ def consistent_loops(chain: OdometryChain, loops: Sequence[Edge], max_residual: 
     Args:
         chain: odometry.
         loops: edges to choose from.
-        max_residual: Mahalanobis distance up to which a cycle counts as closed.
+        max_residual: Mahalanobis distance up to which a single loop counts as true.
     """
     chosen = np.zeros(len(loops), dtype=bool)
     chosen[largest_clique(agreement(chain, loops, max_residual))] = True
@@ -44,7 +46,7 @@ def agreement(chain: OdometryChain, loops: Sequence[Edge], max_residual: float) 
     for begin in range(0, len(first), BLOCK):
         i, j = first[begin : begin + BLOCK], second[begin : begin + BLOCK]
         left, own, odometry, joined = cycles(chain, loops, i, j)
-        closes = squared_mahalanobis(left, own + odometry) <= max_residual**2
+        closes = squared_mahalanobis(left, own + odometry) <= (PAIR_SLACK * max_residual) ** 2
         agree[i, j] = agree[j, i] = closes | ~joined
     return agree
 
