@@ -39,7 +39,9 @@ def remarks(sentences: Sequence[str], most: int = 5) -> None:
 def bar(title: str, total: int | None, unit: str = "frames") -> Iterator[Callable[[int, int | None], None]]:
     """Show a progress bar; the function given sets how much is done, and of how much where that is known by now."""
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn(unit))
-    with Progress(*columns, TimeElapsedColumn(), TimeRemainingColumn(), console=err, transient=True) as progress:
+    with Progress(
+        *columns, TimeElapsedColumn(), TimeRemainingColumn(), console=err, transient=True, disable=not err.is_terminal
+    ) as progress:
         task = progress.add_task(title, total=total)
         yield lambda done, whole: progress.update(task, completed=done, total=whole)
 
