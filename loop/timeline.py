@@ -46,7 +46,14 @@ class Timeline:
             query: the newer keyframe.
             scores: (N,) in 0..1, one per remembered keyframe; 0 is never a candidate.
         """
+        return self._top(query, np.where(scores >= self._min_score, scores, 0.0))
+
+    def nearest(self, query: Keyframe, scores: FloatArray) -> list[int]:
+        """The same without the least score that makes a candidate."""
+        return self._top(query, scores)
+
+    def _top(self, query: Keyframe, scores: FloatArray) -> list[int]:
         old_enough = query.timestamp - self._stamps.rows >= self._min_gap
-        fit = np.flatnonzero(old_enough & (scores > 0) & (scores >= self._min_score))
+        fit = np.flatnonzero(old_enough & (scores > 0))
         order = np.argsort(-scores[fit], kind="stable")[: self._max_candidates]
         return [int(position) for position in fit[order]]

@@ -259,6 +259,14 @@ class DbowConfig(Section):
     min_score: float = Field(0.05, ge=0, le=1, description="score of a candidate")
 
 
+class FusedConfig(Section):
+    """Whole image, words and classes joined."""
+
+    min_probability: float = Field(0.5, ge=0, le=1, description="probability of the same place that makes a candidate")
+    word_share: float = Field(0.4, ge=0, lt=1, description="share of the candidates that are the best by words")
+    min_word_probability: float = Field(0.05, ge=0, le=1, description="probability that those need")
+
+
 class Conv3Config(Section):
     """Flattened convolutional features."""
 
@@ -336,6 +344,7 @@ class Config(Section):
     loops: LoopConfig = LoopConfig()
     semantic: SemanticConfig = SemanticConfig()
     semantic_paper: PaperSemanticConfig = PaperSemanticConfig()
+    fused: FusedConfig = FusedConfig()
     dbow: DbowConfig = DbowConfig()
     conv3: Conv3Config = Conv3Config()
     verification: VerificationConfig = VerificationConfig()

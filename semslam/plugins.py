@@ -24,6 +24,7 @@ DETECTORS: dict[str, str] = {
     "none": "loop.detector:NoLoops",
     "semantic": "loop.semantic:SemanticDetector",
     "semantic-paper": "loop.semantic:PaperSemanticDetector",
+    "fused": "loop.fused:FusedDetector",
     "dbow": "loop.dbow:DbowDetector",
     "sda": "loop.sda:SdaDetector",
     "cnnw": "loop.cnnw:CnnwDetector",

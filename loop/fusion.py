@@ -1,0 +1,100 @@
+"""How the parts of the fused detector are measured and joined."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from semslam.errors import ModelError
+from semslam.types import Float32Array, FloatArray, UInt8Array
+
+SHIPPED = Path(__file__).parent / "weights" / "fusion.npz"
+POWER = 3.0
+MOVABLE_WEIGHT = 0.5
+"""What a movable class counts beside structure, which stays where it is."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FusionModel:
+    """What was learned of the fusion.
+
+    Attributes:
+        mean: (640,) of the pooled descriptors.
+        projection: (640, D) that shrinks what changes with viewpoint and light, and keeps what tells places apart.
+        weights: (3,) of the whole image, the words and the classes in the logistic score.
+        bias: of the logistic score.
+    """
+
+    mean: Float32Array
+    projection: Float32Array
+    weights: FloatArray
+    bias: float
+
+    def whole(self, high: Float32Array) -> Float32Array:
+        """The image's unit descriptor (D,) from the encoder's last layer (h, w, 320)."""
+        projected = (pool(high) - self.mean) @ self.projection
+        return np.asarray(projected / max(float(np.linalg.norm(projected)), 1e-9), dtype=np.float32)
+
+    def probability(self, parts: FloatArray) -> FloatArray:
+        """Probability (N,) of the same place from the cosine, word and class scores (N, 3)."""
+        probability: FloatArray = 1 / (1 + np.exp(-(parts @ self.weights + self.bias)))
+        return probability
+
+    def save(self, path: Path) -> None:
+        """Write it as a compressed npz."""
+        np.savez_compressed(
+            path, mean=self.mean.astype(np.float32), projection=self.projection.astype(np.float16),
+            weights=self.weights, bias=np.float64(self.bias),
+        )  # fmt: skip
+
+
+def load_fusion(path: Path = SHIPPED) -> FusionModel:
+    """Read the model.
+
+    Raises:
+        ModelError: the file is missing or damaged.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as arrays:
+            return FusionModel(
+                arrays["mean"], arrays["projection"].astype(np.float32), arrays["weights"], float(arrays["bias"])
+            )
+    except (OSError, ValueError, KeyError) as error:
+        raise ModelError(f"There is no fusion model at {path}, or it is damaged.") from error
+
+
+def pool(features: Float32Array) -> Float32Array:
+    """Generalised mean (Radenović et al., TPAMI 2019) of positive and negative parts of (h, w, C), unit (2 C,)."""
+    flat = features.reshape(-1, features.shape[-1])
+    parts = [np.mean(np.maximum(sign * flat, 0.0) ** POWER, axis=0) ** (1 / POWER) for sign in (1.0, -1.0)]
+    pooled = np.concatenate(parts)
+    return np.asarray(pooled / max(float(np.linalg.norm(pooled)), 1e-9), dtype=np.float32)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ClassFeatures:
+    """Mid-level features of an image, averaged over each class.
+
+    Attributes:
+        labels: (K,) classes, ascending.
+        vectors: (K, C) float32, of unit length.
+        shares: (K,) square root of the share of the image, times the class's weight.
+    """
+
+    labels: UInt8Array
+    vectors: Float32Array
+    shares: FloatArray
+
+
+def pool_classes(middle: Float32Array, labels: UInt8Array, movable: frozenset[int]) -> ClassFeatures:
+    """Average features (h, w, C) over the classes of a label image (H, W); void is left out."""
+    height, width = middle.shape[:2]
+    small = cv2.resize(labels, (width, height), interpolation=cv2.INTER_NEAREST).ravel()
+    present = np.unique(small[small > 0])
+    member = (small[None, :] == present[:, None]).astype(np.float32)
+    counts = member.sum(axis=1)
+    vectors = member @ middle.reshape(len(small), -1) / np.maximum(counts, 1)[:, None]
+    vectors /= np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-9)
+    weights = np.array([MOVABLE_WEIGHT if int(label) in movable else 1.0 for label in present])
+    return ClassFeatures(present.astype(np.uint8), vectors.astype(np.float32), np.sqrt(counts / len(small)) * weights)
