@@ -8,7 +8,7 @@ from semslam.geometry import Float32Array, FloatArray
 
 GREY = (127, 127, 127)
 STRONG_ROTATION = 45.0
-CLOSE, TURNED = 0.15, 0.25
+CLOSE, TURNED = 0.1, 0.2
 HALF = 0.6
 
 
@@ -39,7 +39,7 @@ def _placement(
 ) -> tuple[FloatArray, float]:
     """Affine map (2, 3) from photo to view, and view pixels per photo pixel.
 
-    Half of the views are near to how the photo was taken; the others are taken closer, as over a tabletop, or
+    Most views are near to how the photo was taken; the others are taken closer, as over a tabletop, or
     turned.
     """
     fit = min(width / inside_width, height / inside_height)
