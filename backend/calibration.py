@@ -21,6 +21,8 @@ QUARTILE, QUARTILE_CHI2 = 25.0, 3.4546
 MEDIAN, MEDIAN_CHI2 = 50.0, 5.3481
 TOLERANCE = 1.5
 """Smaller factors are taken for chance and left at 1."""
+BEYOND = 1.5
+"""Where this many times the largest factor does not reconcile odometry and loops, odometry is not to blame."""
 STEPS = 12
 """Halvings of the search for a factor."""
 NEIGHBOURHOOD = 3
@@ -99,7 +101,8 @@ def _smallest_scale(
 ) -> float:
     """Smallest factor on ``scaled``'s deviations that brings a percentile of the squared distances down to chance.
 
-    Where even ``limit`` does not, 1: then it is the loops that are wrong, such as those between rooms that look alike.
+    Where even far more than ``limit`` does not, 1: then it is the loops that are wrong, such as those between rooms
+    that look alike.
     """
     if len(left) < QUORUM:
         return 1.0
@@ -108,7 +111,7 @@ def _smallest_scale(
         distances = squared_mahalanobis(left, fixed + scale**2 * scaled)
         return bool(np.percentile(distances, percentile) <= expected)
 
-    if limit <= TOLERANCE or fits(TOLERANCE) or not fits(limit):
+    if limit <= TOLERANCE or fits(TOLERANCE) or not fits(BEYOND * limit):
         return 1.0
     low, high = TOLERANCE, limit
     for _ in range(STEPS):
