@@ -1,0 +1,138 @@
+"""Same place or only alike: detectors on pairs of frames (paper, section 4.3, Table 2).
+
+The pairs come from ``eval.pair_choice`` or ``eval.pair_folder``; the threshold always from other sequences.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from typing import Protocol
+
+import numpy as np
+
+from eval.precision_recall import Scorer
+from eval.trajectory import BoolArray
+from semslam.errors import ConfigError
+from semslam.geometry import FloatArray
+from semslam.types import Frame, KeyframeView
+
+# Seconds between the stamps of handed-out frames: far enough for every detector's idea of "the same moment".
+APART = 1000.0
+
+
+class PairGroup(StrEnum):
+    """The three columns of the paper's Table 2."""
+
+    VIEWPOINT = "viewpoint"
+    ILLUMINATION = "illumination"
+    OBJECTS = "objects"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Pair:
+    """Two frames and whether they show the same place.
+
+    Attributes:
+        group: which change it is about.
+        kind: the change in a few words.
+        same_place: truth.
+        load: reads frame 0, which is remembered, or frame 1, which is changed and asked for.
+        poses: (2, 4, 4) T_world_cam of both; identity where not known.
+    """
+
+    group: PairGroup
+    kind: str
+    same_place: bool
+    load: Callable[[int], Frame]
+    poses: FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class GroupAccuracy:
+    """Share of a group's pairs that were told rightly, and their number."""
+
+    accuracy: float
+    pairs: int
+
+
+@dataclass(frozen=True, slots=True)
+class PairQuality:
+    """A row of the table: a detector's accuracy in each group."""
+
+    detector: str
+    groups: dict[str, GroupAccuracy]
+
+
+class ViewMaker(Protocol):
+    """Makes what detectors see out of a frame: features, and labels where they are needed."""
+
+    def __call__(self, identity: int, frame: Frame, T_world_cam: FloatArray) -> KeyframeView:
+        """The view of keyframe ``identity``."""
+
+
+def score_pairs(detectors: Mapping[str, Scorer], pairs: Sequence[Pair], make_view: ViewMaker) -> dict[str, FloatArray]:
+    """Scores (M,) of each pair by each detector: the first frame is remembered, the second one asked for.
+
+    Args:
+        detectors: fresh ones, set to name every pair they can (as for ``eval.precision_recall.Contestant``). All
+            first frames are in one database, their stamps far apart; a pair that is not named scores 0.
+        pairs: what to score.
+        make_view: is called twice a pair.
+    """
+    for index, view in enumerate(_views(pairs, 0, make_view)):
+        for detector in detectors.values():
+            detector.add(view)
+        assert view.keyframe.id == index
+    scores = {name: np.zeros(len(pairs)) for name in detectors}
+    for index, view in enumerate(_views(pairs, 1, make_view)):
+        for name, detector in detectors.items():
+            scores[name][index] = max((c.score for c in detector.query(view) if c.match == index), default=0.0)
+    return scores
+
+
+def best_threshold(scores: FloatArray, same_place: BoolArray) -> float:
+    """The score from which on "same place" is right most often: midway between the scores it parts.
+
+    Same and different places weigh alike, however many there are of each; of equal thresholds the highest.
+    """
+    values = np.unique(scores)[::-1]
+    cuts = np.concatenate([[values[0] + 1e-9], (values[:-1] + values[1:]) / 2, [values[-1]]])
+    accepted = scores[None, :] >= cuts[:, None]
+    hits = (accepted & same_place).sum(axis=1) / max(int(same_place.sum()), 1)
+    alarms = (accepted & ~same_place).sum(axis=1) / max(int((~same_place).sum()), 1)
+    return float(cuts[np.argmax(hits - alarms)])
+
+
+def judge_pairs(scores: Mapping[str, Sequence[FloatArray]], pairs: Sequence[Sequence[Pair]]) -> list[PairQuality]:
+    """Accuracy in each group, each sequence judged at the threshold that is best on all the others.
+
+    Args:
+        scores: for each detector the scores of each sequence's pairs.
+        pairs: each sequence's pairs.
+
+    Raises:
+        ConfigError: fewer than two sequences hold pairs, so that no other could give the threshold.
+    """
+    if sum(bool(some) for some in pairs) < 2:
+        raise ConfigError("The threshold comes from other sequences: give at least two that hold pairs.")
+    return [PairQuality(name, _accuracy(per_sequence, pairs)) for name, per_sequence in scores.items()]
+
+
+def _accuracy(scores: Sequence[FloatArray], pairs: Sequence[Sequence[Pair]]) -> dict[str, GroupAccuracy]:
+    truth = [np.array([pair.same_place for pair in some], dtype=bool) for some in pairs]
+    right: dict[PairGroup, list[bool]] = {group: [] for group in PairGroup}
+    for at in range(len(pairs)):
+        others = [i for i in range(len(pairs)) if i != at]
+        threshold = best_threshold(
+            np.concatenate([scores[i] for i in others]), np.concatenate([truth[i] for i in others])
+        )
+        for pair, score in zip(pairs[at], scores[at], strict=True):
+            right[pair.group].append(bool((score >= threshold) == pair.same_place))
+    return {group.value: GroupAccuracy(float(np.mean(hits)), len(hits)) for group, hits in right.items() if hits}
+
+
+def _views(pairs: Sequence[Pair], side: int, make_view: ViewMaker) -> Iterator[KeyframeView]:
+    for index, pair in enumerate(pairs):
+        identity = index + side * len(pairs)
+        frame = replace(pair.load(side), index=identity, timestamp=APART * identity)
+        yield make_view(identity, frame, pair.poses[side])
