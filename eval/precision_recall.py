@@ -202,7 +202,7 @@ def draw_curves(curves: Mapping[str, Curve], title: str) -> bytes:
             precision = np.concatenate([curve.precision[:1], curve.precision])
             color, line = looks[name]
             label = f"{name}: {average_precision(curve):.3f}"
-            axes.plot(recall, precision, color=color, linestyle=line, linewidth=1.8, label=label)
+            axes.step(recall, precision, where="pre", color=color, linestyle=line, linewidth=1.8, label=label)
         axes.set(xlabel="recall", ylabel="precision", title=title, xlim=(-0.01, 1.01), ylim=(0, 1.02))
         axes.legend(title="average precision", loc="lower left", alignment="left")
 
