@@ -1,6 +1,6 @@
 """Fixtures that many tests use."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from semslam.camera import Intrinsics
+from semslam.cli import main
 from semslam.errors import DatasetError
 from semslam.geometry import make_transform
 from semslam.types import Frame, Trajectory
@@ -82,3 +83,31 @@ def _poster(height: int, width: int) -> np.ndarray:
 def wall() -> WallDataset:
     """A short sequence with exact poses."""
     return WallDataset()
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a command left on the screen, and its exit code."""
+
+    code: int
+    out: str
+    err: str
+
+
+Call = Callable[..., Outcome]
+
+
+@pytest.fixture
+def semslam(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Call:
+    """Run a command in this process."""
+
+    def call(*arguments: object) -> Outcome:
+        monkeypatch.setattr("sys.argv", ["semslam", *map(str, arguments)])
+        with pytest.raises(SystemExit) as stopped:
+            main()
+            raise SystemExit(0)
+        code = stopped.value.code
+        captured = capsys.readouterr()
+        return Outcome(code if isinstance(code, int) else 1, captured.out, captured.err)
+
+    return call

@@ -1,42 +1,13 @@
 """The command line as a person meets it."""
 
 import json
-from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
-from semslam.cli import main
+from tests.conftest import Call
 
-
-@dataclass(frozen=True)
-class Outcome:
-    """What a command left on the screen, and its exit code."""
-
-    code: int
-    out: str
-    err: str
-
-
-Call = Callable[..., Outcome]
-SMALL = ("synthetic:house?frames=12", "--set", "features.count=400")
-
-
-@pytest.fixture
-def semslam(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Call:
-    """Run a command in this process."""
-
-    def call(*arguments: object) -> Outcome:
-        monkeypatch.setattr("sys.argv", ["semslam", *map(str, arguments)])
-        with pytest.raises(SystemExit) as stopped:
-            main()
-            raise SystemExit(0)
-        code = stopped.value.code
-        captured = capsys.readouterr()
-        return Outcome(code if isinstance(code, int) else 1, captured.out, captured.err)
-
-    return call
+SMALL = ("synthetic:room?frames=12", "--set", "features.count=400")
 
 
 def sentences(text: str) -> list[str]:
