@@ -51,10 +51,11 @@ def extract_nodes(label_map: LabelMap, depth: Float32Array, config: NodeConfig) 
         config: the readings above.
     """
     parts: list[SemanticNodes] = []
-    for label in np.flatnonzero(np.bincount(label_map.labels.ravel(), minlength=1)):
-        if label == 0:
+    least = max(1.0, config.min_area * label_map.labels.size)
+    for label, count in enumerate(np.bincount(label_map.labels.ravel(), minlength=1)):
+        if label == 0 or count < least:
             continue
-        nodes = _blocks(label_map.labels == label, int(label), depth, config)
+        nodes = _blocks(label_map.labels == label, label, depth, config)
         parts.append(merge_dense(nodes, config.cluster_radius * max(depth.shape) / REFERENCE_SIDE, config.cluster_size))
     if not parts:
         return SemanticNodes(np.empty(0, np.uint8), np.empty((0, 3)), np.empty(0))
@@ -91,18 +92,21 @@ def merge_dense(nodes: SemanticNodes, radius: float, least: int) -> SemanticNode
 
 
 def _blocks(mask: npt.NDArray[np.bool_], label: int, depth: Float32Array, config: NodeConfig) -> SemanticNodes:
+    left, top, width, height = cv2.boundingRect(mask.view(np.uint8))
+    window = np.s_[top : top + height, left : left + width]
     _, blocks, stats, centroids = cv2.connectedComponentsWithStats(
-        mask.astype(np.uint8), connectivity=config.connectivity
+        mask[window].view(np.uint8), connectivity=config.connectivity
     )
     areas = stats[:, cv2.CC_STAT_AREA].astype(np.float64)
     kept = np.flatnonzero(areas >= config.min_area * mask.size)
     kept = kept[kept > 0]  # the first component is everything outside the mask
+    centres = centroids[kept] + (left, top)
     if config.depth is DepthReading.CENTROID:
-        u, v = np.rint(centroids[kept]).astype(np.int64).T
+        u, v = np.rint(centres).astype(np.int64).T
         depths = depth[v, u].astype(np.float64)
     else:
-        depths = np.array([_median_depth(depth, blocks == block) for block in kept])
-    uvd = np.column_stack([centroids[kept], depths])
+        depths = np.array([_median_depth(depth[window], blocks == block) for block in kept])
+    uvd = np.column_stack([centres, depths])
     if not config.keep_without_depth:
         kept, uvd = kept[depths > 0], uvd[depths > 0]
     order = np.argsort(-areas[kept], kind="stable")

@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from loop.growing import GrowingArray
+from loop.memo import LastView
 from loop.nodes import SemanticNodes, extract_nodes
 from loop.timeline import Timeline
 from semslam.config import Config, DistanceReading, LoopConfig, MatchReading, SemanticConfig, ShareReading
@@ -46,6 +47,7 @@ class SemanticDetector:
         self._node_counts = GrowingArray(np.int64)
         self._label_counts = GrowingArray(np.int64)
         self._shelves: dict[int, _Shelf] = defaultdict(_Shelf)
+        self._extract = LastView(self._find_nodes)
 
     @classmethod
     def from_config(cls, config: Config) -> Self:
@@ -75,7 +77,7 @@ class SemanticDetector:
         for label in labels:
             self._shelves[int(label)].append(position, nodes.of(label))
 
-    def _extract(self, view: KeyframeView) -> SemanticNodes:
+    def _find_nodes(self, view: KeyframeView) -> SemanticNodes:
         if view.labels is None:
             raise ConfigError(f"The detector '{self.name}' needs a segmentation, and none came with the keyframe.")
         return extract_nodes(view.labels, view.depth, self._config.nodes)
