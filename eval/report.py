@@ -226,7 +226,7 @@ PAGE = Template("""<!doctype html>
 body { font: 15px/1.5 system-ui, "Segoe UI", "DejaVu Sans", sans-serif; color: #222; background: #f6f7f8; margin: 0; }
 main { max-width: 1180px; margin: 0 auto; padding: 28px 24px 60px; }
 h1 { font-size: 26px; margin: 0 0 18px; } h2 { font-size: 18px; margin: 36px 0 12px; }
-.facts { display: grid; grid-template-columns: repeat(auto-fit, minmax(130px, 1fr)); gap: 10px; }
+.facts { display: grid; grid-template-columns: repeat(auto-fit, minmax(100px, 1fr)); gap: 10px; }
 .facts div, table, figure, details { background: #fff; border: 1px solid #e2e4e7; border-radius: 8px; }
 .facts div { padding: 10px 14px; } .facts b { display: block; font-size: 19px; }
 .facts span { color: #667; font-size: 13px; }
