@@ -15,7 +15,7 @@ class FeatureOdometry:
     """Matches ORB features with the previous frame's and solves PnP among wrong matches. Drifts: it has no map."""
 
     def __init__(self, config: Config) -> None:
-        self._tracker = ReferenceTracker(_FeatureRegistrar(config))
+        self._tracker = ReferenceTracker(FeatureRegistrar(config))
 
     @classmethod
     def from_config(cls, config: Config) -> Self:
@@ -32,24 +32,30 @@ class FeatureOdometry:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _View:
+class FeatureView:
+    """Keypoints of a frame and its camera."""
+
     features: Features
     intrinsics: Intrinsics
 
 
-class _FeatureRegistrar:
+class FeatureRegistrar:
+    """Registers frames to one another by matches and PnP."""
+
     def __init__(self, config: Config) -> None:
         self._config = config.feature
         self._seed = config.seed
         self._extractor = FeatureExtractor(config.features)
 
-    def prepare(self, frame: Frame) -> _View | None:
+    def prepare(self, frame: Frame) -> FeatureView | None:
+        """Find keypoints; None where too few have depth."""
         features = self._extractor.extract(frame)
         if np.count_nonzero(features.depths) < self._config.min_inliers:
             return None
-        return _View(features, frame.intrinsics)
+        return FeatureView(features, frame.intrinsics)
 
-    def register(self, reference: _View, current: _View, T_ref_cam: FloatArray) -> Registration | None:
+    def register(self, reference: FeatureView, current: FeatureView, T_ref_cam: FloatArray) -> Registration | None:
+        """Register ``current`` to ``reference``; the guess is not needed. None where too few matches agree."""
         matches = match_descriptors(reference.features.descriptors, current.features.descriptors)
         matches = matches[reference.features.depths[matches[:, 0]] > 0]
         found = solve_pnp(

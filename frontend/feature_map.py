@@ -4,6 +4,7 @@ from typing import Self
 
 import numpy as np
 
+from frontend.bridge import Bridge, NoBridge
 from frontend.landmarks import NONE
 from frontend.local_map import LocalMap, MapKeyframe
 from frontend.map_pose import Located, View, locate
@@ -28,8 +29,9 @@ class FeatureMapOdometry:
     that cannot be tracked is looked for in all maps; where that fails for a while, a new map starts.
     """
 
-    def __init__(self, config: Config) -> None:
+    def __init__(self, config: Config, bridge: Bridge | None = None) -> None:
         self._config = config.feature_map
+        self._bridge = bridge or NoBridge()
         self._seed = config.seed
         self._scale = config.features.scale
         self._extractor = FeatureExtractor(config.features)
@@ -59,6 +61,11 @@ class FeatureMapOdometry:
             DatasetError: the frame's size does not fit its intrinsics.
         """
         check_frame(frame)
+        motion = self._track(frame)
+        self._bridge.note(frame)
+        return motion
+
+    def _track(self, frame: Frame) -> Motion:
         raw = self._extractor.extract(frame)
         self._mapper.proceed()
         if not self._started:
@@ -72,12 +79,12 @@ class FeatureMapOdometry:
         view = self._view(frame, raw, velocity_of(T_prev_cur, elapsed))
         coarse = self._locate_coarsely(view, T_map_prev @ T_prev_cur)
         if coarse is None:
-            return self._lose(view)
+            return self._cross(frame, view, T_map_prev)
         if self._lost_since is None:
             view = self._view(frame, raw, velocity_of(invert(T_map_prev) @ coarse.T_map_cam, elapsed))
         found = self._locate(view, coarse.T_map_cam, self._around(coarse.landmarks), self._config.narrow_radius)
         if found is None:
-            return self._lose(view)
+            return self._cross(frame, view, T_map_prev)
         return self._accept(view, raw, found, T_map_prev)
 
     def _view(self, frame: Frame, raw: Features, velocity: FloatArray) -> View:
@@ -151,6 +158,22 @@ class FeatureMapOdometry:
         self._readout.learn(
             points, measured, raw.pixels[found.keypoints, 1], view.camera, view.velocity, self._readout.seconds
         )
+
+    def _cross(self, frame: Frame, view: View, T_map_prev: FloatArray) -> Motion:
+        """Where the map is not met, go on by another kind of registration, if there is one and it succeeds."""
+        found = None
+        if self._lost_since is None and self._reference is not None:
+            found = self._bridge.register(frame, self._prediction.predict(frame.timestamp))
+        if found is None or self._reference is None:
+            return self._lose(view)
+        self._prediction.tracked(frame.timestamp, found.T_ref_cam)
+        T_map_cam = T_map_prev @ found.T_ref_cam
+        T_prev_cur = invert(self._T_reported) @ T_map_cam
+        self._T_reported = T_map_cam
+        self._T_ref_prev = invert(self._reference.T_map_cam) @ T_map_cam
+        if view.timestamp - self._keyframe_time >= self._config.restart_seconds:
+            self._start_map(view)  # continues the map with what is seen here
+        return Motion(T_prev_cur, found.covariance, TrackingStatus.DEGRADED, self._map_id, found.inliers)
 
     def _lose(self, view: View) -> Motion:
         """Predict; and where good images have not met the map for a while, start a new one."""

@@ -1,4 +1,4 @@
-"""Tracking against one reference image: the state machine that the frame-to-frame odometries share."""
+"""Tracking against one reference image: the state machine that odometries without a map share."""
 
 from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar
@@ -6,7 +6,7 @@ from typing import Generic, Protocol, TypeVar
 import numpy as np
 
 from frontend.prediction import ConstantVelocity, check_frame, first_motion
-from semslam.geometry import invert
+from semslam.geometry import invert, rotation_angle
 from semslam.types import FloatArray, Frame, Motion, TrackingStatus
 
 RESTART_SECONDS = 0.5
@@ -42,15 +42,38 @@ class Registrar(Protocol[ViewT]):
         """Register ``current`` to ``reference`` from a first guess, or None where they do not meet."""
 
 
+@dataclass(frozen=True, slots=True)
+class Reach:
+    """How far the camera may move before a reference is replaced.
+
+    Attributes:
+        translation: metres.
+        rotation: radians.
+    """
+
+    translation: float
+    rotation: float
+
+    def covers(self, found: Registration) -> bool:
+        """Whether the reference still serves the next frame."""
+        moved = float(np.linalg.norm(found.T_ref_cam[:3, 3]))
+        turned = float(rotation_angle(found.T_ref_cam))
+        return not found.degraded and moved < self.translation and turned < self.rotation
+
+
+FRAME_TO_FRAME = Reach(0.0, 0.0)
+
+
 class ReferenceTracker(Generic[ViewT]):
-    """Tracks every frame against the last one that could be tracked.
+    """Tracks every frame against a reference: the last one that could be tracked, or one from a little before.
 
     While frames cannot be tracked the motion is predicted and the reference is kept, so that a short black-out is
     bridged by a true measurement. Where the camera returns to something else, a new map starts.
     """
 
-    def __init__(self, registrar: Registrar[ViewT]) -> None:
+    def __init__(self, registrar: Registrar[ViewT], reach: Reach = FRAME_TO_FRAME) -> None:
         self._registrar = registrar
+        self._reach = reach
         self._prediction = ConstantVelocity()
         self._reference: ViewT | None = None
         self._reference_time = -np.inf
@@ -70,7 +93,7 @@ class ReferenceTracker(Generic[ViewT]):
         if not self._started:
             self._started = True
             self._prediction.tracked(frame.timestamp, np.eye(4))
-            self._refer_to(view, frame.timestamp, np.eye(4))
+            self._refer_to(view, frame.timestamp)
             return first_motion()
         guess = self._T_ref_prev @ self._prediction.predict(frame.timestamp)
         found = None
@@ -83,7 +106,10 @@ class ReferenceTracker(Generic[ViewT]):
         status = TrackingStatus.DEGRADED if found.degraded else TrackingStatus.OK
         status = TrackingStatus.RELOCALISED if self._lost else status
         self._lost = False
-        self._refer_to(view, frame.timestamp, np.eye(4))
+        if self._reach.covers(found):
+            self._T_ref_prev, self._reference_time = found.T_ref_cam, frame.timestamp
+        else:
+            self._refer_to(view, frame.timestamp)
         return Motion(T_prev_cur, found.covariance, status, self._map_id, found.inliers)
 
     def _lose(self, view: ViewT | None, timestamp: float) -> Motion:
@@ -91,13 +117,13 @@ class ReferenceTracker(Generic[ViewT]):
         if view is not None and timestamp - self._reference_time > RESTART_SECONDS:
             self._map_id += 1
             self._lost = False
-            self._refer_to(view, timestamp, np.eye(4))
+            self._refer_to(view, timestamp)
             return self._prediction.lost(timestamp, self._map_id)
         motion = self._prediction.lost(timestamp, self._map_id)
         self._T_ref_prev = self._T_ref_prev @ motion.T_prev_cur
         return motion
 
-    def _refer_to(self, view: ViewT | None, timestamp: float, T_ref_prev: FloatArray) -> None:
-        self._T_ref_prev = T_ref_prev
+    def _refer_to(self, view: ViewT | None, timestamp: float) -> None:
+        self._T_ref_prev = np.eye(4)
         if view is not None:
             self._reference, self._reference_time = view, timestamp

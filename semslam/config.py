@@ -115,6 +115,9 @@ class DenseConfig(Section):
     min_coverage: float = Field(0.05, gt=0, le=1, description="share of pixels that must have depth")
     min_contrast: float = Field(4.0, ge=0, description="standard deviation of grey values that an image must have")
     min_fitness: float = Field(0.3, gt=0, le=1, description="share of pixels that must agree on a motion")
+    keyframe_translation: float = Field(0.1, ge=0, description="metres after which dense_keyframe takes a new keyframe")
+    keyframe_rotation: float = Field(0.15, ge=0, description="radians, the same")
+    max_bridge: float = Field(0.2, gt=0, description="seconds between frames that may be bridged where features starve")
     sigma: float = Field(0.6, gt=0, description="metres; error of one pixel's depth that calibrates the covariance")
 
 
@@ -314,7 +317,7 @@ class BackendConfig(Section):
 
     robust: str = Field("gnc", description="how false loops are held off: gnc, pcm, dcs, cauchy, huber or none")
     max_residual: float = Field(
-        4.1, gt=0, description="Mahalanobis distance at which a loop is taken for false; 4.1 = 99 % of true ones"
+        4.7, gt=0, description="Mahalanobis distance at which a loop is taken for false; 4.7 = 99.9 % of true ones"
     )
     max_iterations: int = Field(100, gt=0, description="Levenberg-Marquardt steps at the most")
     max_odometry_scale: float = Field(

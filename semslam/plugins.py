@@ -18,7 +18,9 @@ ODOMETRIES: dict[str, str] = {
     "feature_map": "frontend.feature_map:FeatureMapOdometry",
     "feature": "frontend.feature:FeatureOdometry",
     "dense": "frontend.dense:DenseOdometry",
+    "dense_keyframe": "frontend.dense_keyframe:DenseKeyframeOdometry",
     "kiss": "frontend.kiss:KissOdometry",
+    "auto": "frontend.auto:AutoOdometry",
 }
 DETECTORS: dict[str, str] = {
     "none": "loop.detector:NoLoops",
