@@ -25,8 +25,8 @@ DCS_PHI = 10.0
 """At 1, the literature's value, true loops are thrown away once odometry has drifted."""
 CAUCHY_K = 1.0
 GNC_START = 1e-6
-GNC_GROWTH = 2.0
-GNC_STEPS = 60
+GNC_GROWTH = 1.4
+GNC_STEPS = 100
 GNC_INNER_STEPS = 4
 SETTLING_ROUNDS = 5
 MIN_WEIGHT = 1e-6
