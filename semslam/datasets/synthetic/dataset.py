@@ -112,6 +112,11 @@ class SyntheticDataset:
         """Seconds from 0."""
         return [float(t) for t in self._walk.timestamps]
 
+    @property
+    def second_pass(self) -> npt.NDArray[np.bool_]:
+        """Whether each frame belongs to the second pass, (N,)."""
+        return self._walk.second
+
     @cached_property
     def ground_truth(self) -> Trajectory:
         """Exact poses; the world's z points up."""
@@ -129,11 +134,15 @@ class SyntheticDataset:
         return (self.frame(index) for index in range(len(self)))
 
     def frame(self, index: int) -> Frame:
-        """Render one frame as the sensor sees it."""
+        """Render one frame as the sensor sees it.
+
+        Raises:
+            IndexError: there is no such frame.
+        """
         view = self.view(index)
         if self._request.noise:
             rng = np.random.default_rng([self._request.seed, 2, index])
-            color, depth = sense_color(view.color, rng), sense_depth(view, rng)
+            color, depth = sense_color(view.color, rng), sense_depth(view, self.intrinsics.fx, rng)
         else:
             color, depth = np.clip(np.rint(view.color), 0, 255).astype(np.uint8), view.depth
         return Frame(index, self.timestamps[index], color, depth, self.intrinsics)
@@ -143,7 +152,13 @@ class SyntheticDataset:
         return self.view(index).labels
 
     def view(self, index: int) -> View:
-        """What a perfect camera sees in a frame."""
+        """What a perfect camera sees in a frame.
+
+        Raises:
+            IndexError: there is no such frame.
+        """
+        if not 0 <= index < len(self):
+            raise IndexError(f"There is no frame {index}: the sequence has {len(self)}.")
         second = bool(self._walk.second[index])
         renderer = _renderer(self._scene, self._request.seed, bool(second and self._request.moved))
         lighting = LIGHTS[self._request.light] if second else LIGHTS["same"]

@@ -89,12 +89,13 @@ def window(width: float, height: float, view: str, frame: str, wall: float = 0.1
     """What fills an opening of the given size, its lower edge at z = 0: pane, bars, reveal, sill; and its light."""
     label, deep = labels.WINDOW, wall * 0.9
     parts = [panel((0, -deep, height / 2), width, height, view, label, spacing=5.0)]
-    half, bar, jamb = width / 2, -deep + 0.03, width / 2 + 0.02
+    # The reveal reaches a little into the opening, so that no ray slips out between it and the wall.
+    half, bar, jamb = width / 2, -deep + 0.03, width / 2 + 0.015
     parts += [box((x, bar, height / 2), (0.06, 0.05, height), frame, label) for x in (-half, 0.0, half)]
     parts += [box((0, bar, z), (width, 0.045, 0.06), frame, label) for z in (0.0, 0.7 * height, height)]
     parts += [box((x, -deep / 2, height / 2), (0.04, deep, height), frame, label) for x in (-jamb, jamb)]
-    parts.append(box((0, -deep / 2, height + 0.02), (width + 0.08, deep, 0.04), frame, label))
-    parts.append(box((0, -deep / 2 + 0.05, -0.02), (width + 0.14, deep + 0.1, 0.04), frame, label))
+    parts.append(box((0, -deep / 2, height + 0.015), (width + 0.08, deep, 0.04), frame, label))
+    parts.append(box((0, -deep / 2 + 0.05, -0.015), (width + 0.14, deep + 0.1, 0.04), frame, label))
     strength = 2.4 * width * height / 9
     lights = [
         Light(

@@ -48,16 +48,11 @@ def living_room(seed: int, moved: bool) -> Room:
     room.stand(1.55, 1.95, [sheet((0, 0, 0.008), 2.5, 1.7, "rug_living", labels.FLOOR_MAT)])
     coffee = (1.95, 1.8) if moved else (1.55, 1.75)
     room.stand(*coffee, furniture.table(1.05, 0.55, 0.42, "walnut"))
-    room.stand(
-        coffee[0] + 0.2,
-        coffee[1] + 0.3,
-        fittings.book_row(stream(seed, "coffee"), 0.25, 0.2, "spines_0", "linen"),
-        z=0.42,
-    )
+    books = fittings.book_row(stream(seed, "coffee"), 0.25, 0.2, "spines_0", "linen")
+    room.stand(coffee[0] + 0.2, coffee[1] + 0.3, books, yaw=-90, z=0.42)
     if not moved:
-        room.stand(
-            coffee[0] - 0.25, coffee[1] + 0.25, fittings.trinket(stream(seed, "bowl"), ("ceramic",), 0.2), z=0.42
-        )
+        bowl = fittings.trinket(stream(seed, "bowl"), ("ceramic",), 0.2)
+        room.stand(coffee[0] - 0.25, coffee[1] + 0.25, bowl, z=0.42)
     room.against("S", 1.45, furniture.cupboard(1.7, 0.45, 0.5, "walnut", "walnut", labels.CABINET, 3, 1), out=0.02)
     room.against("S", 1.45, furniture.monitor("screen_off", "dark", 1.05), out=0.12, z=0.5)
     room.against("W", 2.1, fittings.bookcase(stream(seed, "living"), 1.3, 2.0, "oak", "spines_0", "linen", PROPS))

@@ -66,13 +66,13 @@ def _twins(seed: int, moved: bool) -> Surfaces:
     for x in (4.3, 8.6):
         parts += _frame(x, CORRIDOR_SOUTH)
     for x in (3.2, 5.6):
-        parts += [*_frame(x, CORRIDOR_NORTH), *_leaf(x + 0.45, CORRIDOR_NORTH, 180)]
+        parts += _shut_door(x, CORRIDOR_NORTH)
     return parts, lights
 
 
 def _room(seed: int, moved: bool) -> Surfaces:
     parts, lights = _joined((furnishing.study(seed, moved, archway=False), 0.0, 0.0))
-    return [*parts, *_frame(3.1, CORRIDOR_SOUTH), *_leaf(3.55, CORRIDOR_SOUTH, 180)], lights
+    return parts + _shut_door(3.1, CORRIDOR_SOUTH), lights
 
 
 def _frame(x: float, y: float, yaw: float = 0.0) -> list[Part]:
@@ -81,6 +81,11 @@ def _frame(x: float, y: float, yaw: float = 0.0) -> list[Part]:
 
 def _leaf(x: float, y: float, degrees: float) -> list[Part]:
     return placed(fittings.door_leaf(0.9, 2.04, "door", "white_wood"), x, y, np.radians(degrees))
+
+
+def _shut_door(x: float, y: float) -> list[Part]:
+    """A frame and a leaf that leaves no gap to look through."""
+    return _frame(x, y) + placed(fittings.door_leaf(0.9, 2.08, "door", "white_wood"), x + 0.45, y, np.pi, -0.01)
 
 
 def _joined(*rooms: tuple[Room, float, float]) -> Surfaces:

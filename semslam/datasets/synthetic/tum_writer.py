@@ -1,0 +1,63 @@
+"""Any sequence written in the TUM layout."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from semslam.datasets.camera_file import CAMERA_FILE, write_camera
+from semslam.datasets.cameras import TUM_DEPTH_SCALE
+from semslam.datasets.dataset import Dataset
+from semslam.datasets.tum_format import write_trajectory
+from semslam.errors import DatasetError
+from semslam.types import UInt8Array
+
+JPEG_QUALITY = 95
+DEEPEST = np.iinfo(np.uint16).max
+
+
+def write_tum(
+    dataset: Dataset, folder: Path, jpeg: bool = False, labels: Callable[[int], UInt8Array] | None = None
+) -> None:
+    """Write a sequence: rgb/, depth/ (16-bit PNG, 5000 a metre), their lists, groundtruth.txt and camera.yaml.
+
+    Args:
+        dataset: the sequence; depth beyond 13.1 m does not fit the format and is left out.
+        folder: a folder that is not there yet, or empty.
+        jpeg: colour as JPEG, a few times smaller than PNG, and not exact.
+        labels: label image (H, W) uint8 by frame index, for labels/000000.png and so on; none if None.
+
+    Raises:
+        DatasetError: the folder holds something already, cannot be written, or a frame cannot be read.
+    """
+    try:
+        if folder.exists() and any(folder.iterdir()):
+            raise DatasetError(f"The folder {folder} is not empty; a sequence needs one of its own.")
+        for name in ("rgb", "depth", *(("labels",) if labels else ())):
+            (folder / name).mkdir(parents=True, exist_ok=True)
+        lists = {"rgb": ["# timestamp filename"], "depth": ["# timestamp filename"]}
+        for frame in dataset:
+            stamp = f"{frame.timestamp:.9f}"
+            color, depth = f"rgb/{stamp}.{'jpg' if jpeg else 'png'}", f"depth/{stamp}.png"
+            _write_image(folder / color, frame.color[..., ::-1])
+            units = np.rint(frame.depth.astype(np.float64) * TUM_DEPTH_SCALE)
+            _write_image(folder / depth, np.where(units <= DEEPEST, units, 0).astype(np.uint16))
+            if labels:
+                _write_image(folder / f"labels/{frame.index:06d}.png", labels(frame.index))
+            lists["rgb"].append(f"{stamp} {color}")
+            lists["depth"].append(f"{stamp} {depth}")
+        for name, lines in lists.items():
+            (folder / f"{name}.txt").write_text("\n".join([*lines, ""]), encoding="utf-8")
+    except OSError as error:
+        raise DatasetError(f"The sequence cannot be written to {folder}: {error.strerror}.") from error
+    write_camera(folder / CAMERA_FILE, dataset.intrinsics, TUM_DEPTH_SCALE)
+    if dataset.ground_truth is not None:
+        write_trajectory(folder / "groundtruth.txt", dataset.ground_truth)
+
+
+def _write_image(path: Path, image: UInt8Array | np.ndarray[tuple[int, ...], np.dtype[np.uint16]]) -> None:
+    done, data = cv2.imencode(path.suffix, np.ascontiguousarray(image), [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
+    if not done:
+        raise DatasetError(f"The image {path} could not be encoded.")
+    path.write_bytes(data.tobytes())
