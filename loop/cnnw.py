@@ -23,7 +23,7 @@ class CnnwDetector(DescriptorDetector):
     """
 
     name = "cnnw"
-    min_score = 0.9
+    min_score = 0.85
 
     def __init__(self, loops: LoopConfig, backbone: Backbone, words: Float32Array) -> None:
         super().__init__(loops)

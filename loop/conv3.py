@@ -28,7 +28,7 @@ class Conv3Detector(DescriptorDetector):
     """
 
     name = "conv3"
-    min_score = 0.75
+    min_score = 0.73
 
     def __init__(self, loops: LoopConfig, features: FeatureMap) -> None:
         super().__init__(loops)

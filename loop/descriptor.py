@@ -16,7 +16,8 @@ class DescriptorDetector(ABC):
 
     Attributes:
         name: the registered name.
-        min_score: the score that makes a candidate where the settings name none.
+        min_score: the score that makes a candidate where the settings name none; 99 in 100 pairs of photos of different
+            places (NYUv2) stay below it.
     """
 
     name: str

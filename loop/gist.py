@@ -22,7 +22,7 @@ class GistDetector(DescriptorDetector):
     """Energies of 32 Gabor filters on a 4 x 4 grid, (512,), after local contrast is evened out."""
 
     name = "gist"
-    min_score = 0.9
+    min_score = 0.92
 
     @classmethod
     def from_config(cls, config: Config) -> Self:

@@ -19,7 +19,7 @@ class HogDetector(DescriptorDetector):
     """One HOG descriptor an image: 8 x 6 cells of nine unsigned orientations, blocks of 2 x 2 cells, L2-Hys."""
 
     name = "hog"
-    min_score = 0.7
+    min_score = 0.84
 
     @classmethod
     def from_config(cls, config: Config) -> Self:

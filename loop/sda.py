@@ -18,7 +18,7 @@ WIDTH, HEIGHT = 320, 240
 COLUMNS, ROWS = 8, 6
 PATCH = 41
 REACH = 2
-MIN_SCORE = 0.55
+MIN_SCORE = 0.82
 
 
 class SdaDetector:

@@ -16,7 +16,7 @@ class ThumbnailDetector(DescriptorDetector):
     """Zero-mean correlation of 32 x 24 grey thumbnails."""
 
     name = "thumbnail"
-    min_score = 0.7
+    min_score = 0.61
 
     @classmethod
     def from_config(cls, config: Config) -> Self:

@@ -241,7 +241,7 @@ class SemanticConfig(Section):
     max_distance: float = Field(0.1, gt=0, description="node distance as a share of the larger image side")
     distance: DistanceReading = Field(DistanceReading.IMAGE, description="what the node distance is taken between")
     matching: MatchReading = Field(MatchReading.ONE_TO_ONE, description="which similar nodes are counted")
-    min_node_share: float = Field(0.5, ge=0, le=1, description="share of similar nodes that makes a candidate")
+    min_node_share: float = Field(0.2, ge=0, le=1, description="share of similar nodes that makes a candidate")
     node_share: ShareReading = Field(ShareReading.DICE, description="what the count of similar nodes is divided by")
 
 
@@ -259,7 +259,7 @@ class DbowConfig(Section):
     """Bags of binary words."""
 
     group: float = Field(0.35, ge=0, description="seconds; keyframes this near are scored together")
-    min_score: float = Field(0.05, ge=0, le=1, description="score of a candidate")
+    min_score: float = Field(0.04, ge=0, le=1, description="score of a candidate")
 
 
 class FusedConfig(Section):
