@@ -9,7 +9,7 @@ from loop.memo import LastView
 from loop.timeline import Timeline
 from loop.vocabulary import Vocabulary, load_vocabulary
 from semslam.config import Config, DbowConfig, LoopConfig
-from semslam.types import Float32Array, FloatArray, IntArray, KeyframeView, LoopCandidate, LoopEvidence
+from semslam.types import Float32Array, FloatArray, IntArray, KeyframeView, LoopCandidate, LoopEvidence, UInt8Array
 
 Bag = tuple[IntArray, Float32Array]
 """Words of an image, ascending, and their tf-idf weights, which add up to one."""
@@ -60,7 +60,7 @@ class DbowDetector:
         self._group = config.group
         self._timeline = Timeline(loops, config.min_score)
         self._index = WordIndex()
-        self._bag = LastView(lambda view: make_bag(vocabulary, view))
+        self._bag = LastView(lambda view: make_bag(vocabulary, view.keyframe.features.descriptors))
 
     @classmethod
     def from_config(cls, config: Config) -> Self:
@@ -91,9 +91,9 @@ class DbowDetector:
         self._timeline.add(view.keyframe)
 
 
-def make_bag(vocabulary: Vocabulary, view: KeyframeView) -> Bag:
-    """The view's words with their tf-idf weights."""
-    words, counts = np.unique(vocabulary.words(view.keyframe.features.descriptors), return_counts=True)
+def make_bag(vocabulary: Vocabulary, descriptors: UInt8Array) -> Bag:
+    """The words of descriptors (N, 32) with their tf-idf weights."""
+    words, counts = np.unique(vocabulary.words(descriptors), return_counts=True)
     weights = counts * vocabulary.weights[words]
     used = weights > 0
     weights = weights[used]

@@ -96,7 +96,8 @@ class FusedDetector:
         encoding = self._backbone.encode(view.color)
         movable = frozenset(i for i, name in enumerate(view.labels.names) if name in MOVABLE)
         classes = pool_classes(encoding.middle, view.labels.labels, movable)
-        return _Look(self._model.whole(encoding.high), make_bag(self._vocabulary, view), classes)
+        bag = make_bag(self._vocabulary, view.keyframe.features.descriptors)
+        return _Look(self._model.whole(encoding.high), bag, classes)
 
     def _parts(self, look: _Look) -> FloatArray:
         """Scores (N, 3) of whole image, words and classes with each remembered keyframe."""

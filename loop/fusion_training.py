@@ -89,7 +89,7 @@ def learn_projection(
 
 def _with_strangers(photo: IntArray, same: IntArray, seed: int) -> tuple[IntArray, npt.NDArray[np.bool_]]:
     rng = np.random.default_rng(seed)
-    drawn = rng.integers(0, len(photo), (4 * STRANGERS * len(same), 2))
+    drawn = rng.integers(0, len(photo), (8 * STRANGERS * len(same), 2))
     strange = drawn[np.abs(photo[drawn[:, 0]] - photo[drawn[:, 1]]) > APART]
     # Half of the strangers come from near in the list, so that folds, which go by the list, hold enough of them.
     near = np.abs(photo[strange[:, 0]] - photo[strange[:, 1]]) < (int(photo.max()) + 1) // FOLDS
