@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from semslam.errors import ModelError
+from loop.weight_file import open_weights
 from semslam.types import Float32Array
 
 DROPPED = 0.3
@@ -60,16 +60,12 @@ def load_autoencoder(path: Path) -> Autoencoder:
     Raises:
         ModelError: the file is missing or damaged.
     """
-    try:
-        with np.load(path, allow_pickle=False) as arrays:
-            layers = range(len(arrays.files) // 2 - 1)
-            return Autoencoder(
-                tuple(arrays[f"weight_{i}"].astype(np.float32) for i in layers),
-                tuple(arrays[f"bias_{i}"].astype(np.float32) for i in layers),
-                arrays["mean"], arrays["deviation"],
-            )  # fmt: skip
-    except (OSError, ValueError, KeyError) as error:
-        raise ModelError(f"There is no autoencoder at {path}, or it is damaged.") from error
+    with open_weights(path, "autoencoder") as arrays:
+        layers = range(len(arrays) // 2 - 1)
+        weights = tuple(arrays[f"weight_{i}"].astype(np.float32) for i in layers)
+        biases = tuple(arrays[f"bias_{i}"].astype(np.float32) for i in layers)
+        mean, deviation = (arrays[name].astype(np.float32) for name in ("mean", "deviation"))
+        return Autoencoder(weights, biases, mean, deviation)
 
 
 def train_autoencoder(patches: Float32Array, sizes: tuple[int, ...], seed: int) -> Autoencoder:

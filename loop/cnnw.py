@@ -7,13 +7,12 @@ import numpy as np
 
 from loop.backbone import Backbone
 from loop.descriptor import DescriptorDetector
+from loop.weight_file import open_weights
 from semslam.config import Config, LoopConfig
-from semslam.errors import ModelError
+from semslam.errors import ConfigError
 from semslam.types import Float32Array, KeyframeView
 
 SHIPPED = Path(__file__).parent / "weights" / "channel_words.npz"
-MAP_SIZE = (15, 20)
-"""Rows and columns of a feature map that the shipped words were learned on."""
 
 
 class CnnwDetector(DescriptorDetector):
@@ -40,8 +39,14 @@ class CnnwDetector(DescriptorDetector):
         return cls(config.loops, Backbone.from_config(config), load_channel_words())
 
     def describe(self, view: KeyframeView) -> Float32Array:
-        """The histogram of words (W,)."""
+        """The histogram of words (W,).
+
+        Raises:
+            ConfigError: the network's input size is not that of the words.
+        """
         channels, strengths = unit_channels(self._backbone.encode(view.color).high)
+        if channels.shape[1] != self._words.shape[1]:
+            raise ConfigError("The shipped channel words of 'cnnw' need segmentation.width 320 and height 240.")
         nearest = (channels @ self._words.T).argmax(axis=1)
         return np.bincount(nearest, strengths, len(self._words)).astype(np.float32)
 
@@ -59,11 +64,8 @@ def load_channel_words(path: Path = SHIPPED) -> Float32Array:
     Raises:
         ModelError: the file is missing or damaged.
     """
-    try:
-        with np.load(path, allow_pickle=False) as arrays:
-            return np.asarray(arrays["words"], dtype=np.float32)
-    except (OSError, ValueError, KeyError) as error:
-        raise ModelError(f"There are no channel words at {path}, or they are damaged.") from error
+    with open_weights(path, "list of channel words") as arrays:
+        return arrays["words"].astype(np.float32)
 
 
 def train_channel_words(maps: list[Float32Array], count: int, seed: int) -> Float32Array:

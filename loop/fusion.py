@@ -6,7 +6,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from semslam.errors import ModelError
+from loop.weight_file import open_weights
 from semslam.types import Float32Array, FloatArray, UInt8Array
 
 SHIPPED = Path(__file__).parent / "weights" / "fusion.npz"
@@ -55,13 +55,9 @@ def load_fusion(path: Path = SHIPPED) -> FusionModel:
     Raises:
         ModelError: the file is missing or damaged.
     """
-    try:
-        with np.load(path, allow_pickle=False) as arrays:
-            return FusionModel(
-                arrays["mean"], arrays["projection"].astype(np.float32), arrays["weights"], float(arrays["bias"])
-            )
-    except (OSError, ValueError, KeyError) as error:
-        raise ModelError(f"There is no fusion model at {path}, or it is damaged.") from error
+    with open_weights(path, "fusion model") as arrays:
+        mean, projection = (arrays[name].astype(np.float32) for name in ("mean", "projection"))
+        return FusionModel(mean, projection, arrays["weights"].astype(np.float64), float(arrays["bias"].astype(float)))
 
 
 def pool(features: Float32Array) -> Float32Array:

@@ -2,11 +2,12 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from semslam.errors import ModelError
+from loop.weight_file import open_weights
 from semslam.types import Float32Array, IntArray, UInt8Array
 
 SHIPPED = Path(__file__).parent / "weights" / "vocabulary.npz"
@@ -42,7 +43,7 @@ class Vocabulary:
 
     def save(self, path: Path) -> None:
         """Write it as a compressed npz."""
-        levels = {f"level_{i}": centres for i, centres in enumerate(self.centres)}
+        levels: dict[str, Any] = {f"level_{i}": centres for i, centres in enumerate(self.centres)}
         np.savez_compressed(path, weights=self.weights.astype(np.float16), **levels)
 
 
@@ -52,14 +53,9 @@ def load_vocabulary(path: Path = SHIPPED) -> Vocabulary:
     Raises:
         ModelError: the file is missing or is no vocabulary.
     """
-    try:
-        with np.load(path, allow_pickle=False) as arrays:
-            levels = tuple(np.ascontiguousarray(arrays[f"level_{i}"]) for i in range(len(arrays.files) - 1))
-            return Vocabulary(levels, arrays["weights"].astype(np.float32))
-    except FileNotFoundError as error:
-        raise ModelError(f"There is no vocabulary at {path}.") from error
-    except (OSError, ValueError, KeyError) as error:
-        raise ModelError(f"{path} is not a vocabulary, or it is damaged.") from error
+    with open_weights(path, "vocabulary") as arrays:
+        levels = tuple(np.ascontiguousarray(arrays[f"level_{i}"], dtype=np.uint8) for i in range(len(arrays) - 1))
+        return Vocabulary(levels, arrays["weights"].astype(np.float32))
 
 
 def train_vocabulary(photos: list[UInt8Array], branching: int, depth: int, seed: int) -> Vocabulary:

@@ -1,0 +1,32 @@
+"""Reading the arrays that detectors ship, with a clear word when they do not fit."""
+
+import zipfile
+import zlib
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from semslam.errors import ModelError
+
+
+@contextmanager
+def open_weights(path: Path, content: str) -> Iterator[Mapping[str, npt.NDArray[np.generic]]]:
+    """Open an npz file; its arrays are to be read inside the ``with``.
+
+    Args:
+        path: the file.
+        content: what it should hold, for the message, such as "vocabulary".
+
+    Raises:
+        ModelError: the file is missing, damaged, or holds something else.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as arrays:
+            yield arrays
+    except FileNotFoundError as error:
+        raise ModelError(f"There is no {content} at {path}.") from error
+    except (OSError, ValueError, KeyError, EOFError, AttributeError, zipfile.BadZipFile, zlib.error) as error:
+        raise ModelError(f"{path} is no {content}, or it is damaged.") from error
