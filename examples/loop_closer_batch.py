@@ -33,7 +33,7 @@ def main(detector: str | LoopDetector = "thumbnail") -> tuple[float, float]:
             odometry = odometry.compose(motion)
             graph.add(gtsam.BetweenFactorPose3(X(i - 1), X(i), motion, ODOMETRY_NOISE))
         start.insert(X(i), odometry)
-        for factor in closer.add(X(i), frame.color, frame.depth, frame.timestamp):
+        for factor in closer.add(X(i), frame.color, frame.depth, timestamp=frame.timestamp):
             graph.add(factor)
     result = gtsam.LevenbergMarquardtOptimizer(graph, start).optimize()
     errors = [

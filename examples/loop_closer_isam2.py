@@ -35,7 +35,7 @@ def main(detector: str | LoopDetector = "thumbnail") -> tuple[float, float]:
             estimate = estimate.compose(motion)
             graph.add(gtsam.BetweenFactorPose3(X(i - 1), X(i), motion, ODOMETRY_NOISE))
         values.insert(X(i), estimate)
-        loops = closer.add(X(i), frame.color, frame.depth, frame.timestamp, estimate.matrix())
+        loops = closer.add(X(i), frame.color, frame.depth, estimate.matrix(), frame.timestamp)
         for factor in loops:
             graph.add(factor)
         slots = isam.update(graph, values).getNewFactorsIndices()

@@ -105,8 +105,8 @@ class LoopCloser:
         key: int,
         color: npt.NDArray[np.uint8],
         depth: npt.NDArray[np.floating],
-        timestamp: float,
         T_world_cam: npt.ArrayLike | None = None,
+        timestamp: float | None = None,
         labels: LabelMap | None = None,
     ) -> list[gtsam.BetweenFactorPose3]:
         """Take a keyframe and return a factor for each earlier one that shows the same place.
@@ -117,14 +117,17 @@ class LoopCloser:
             key: the caller's key of the pose, such as ``gtsam.symbol("x", 7)``.
             color: (H, W, 3) uint8 RGB.
             depth: (H, W) metres, registered to colour; 0 = none.
-            timestamp: seconds, ascending.
             T_world_cam: (4, 4) the current estimate of the camera's pose, where there is one.
+            timestamp: seconds, ascending; none = ``keyframes.interval`` after the keyframe before.
             labels: a segmentation, where the caller has one already.
 
         Raises:
             GraphError: the key was used before, the stamp does not ascend, or the pose is not rigid.
             DatasetError: the images do not fit the camera or are of the wrong type.
         """
+        if timestamp is None:
+            before = self._keyframes[-1].timestamp if self._keyframes else 0.0
+            timestamp = before + self._config.keyframes.interval
         self._check(key, timestamp)
         pose = np.eye(4) if T_world_cam is None else checked_pose(T_world_cam, f"The pose of key {key}")
         frame = self._frame(color, depth, timestamp)

@@ -16,8 +16,8 @@ ERRORS = {
     "ate_rmse_m": ("ATE (RMSE)", "m"),
     "ate_sim3_rmse_m": ("ATE after Sim(3)", "m"),
     "ate_max_m": ("largest error", "m"),
-    "rpe_trans_1s_m": ("RPE over 1 s", "m"),
-    "rpe_rot_1s_deg": ("RPE over 1 s", "deg"),
+    "rpe_trans_1s_m": ("RPE over 1 s, translation", "m"),
+    "rpe_rot_1s_deg": ("RPE over 1 s, rotation", "deg"),
 }
 FIGURES = ("inliers", "fitness", "inlier_rmse_m", "overlap", "weight")
 

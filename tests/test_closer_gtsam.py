@@ -65,7 +65,7 @@ def fill(room, closer, count=25):
     color, depth = images(room)
     factors = []
     for i in range(count):
-        factors += closer.add(X(i), color, depth, float(i))
+        factors += closer.add(X(i), color, depth, timestamp=float(i))
     return factors
 
 
@@ -124,20 +124,20 @@ def test_closures_that_an_estimate_contradicts(room):
 def test_wrong_input_is_refused(room):
     closer = LoopCloser(room.CAMERA, FirstAgain(), verifier=Believer())
     color, depth = images(room)
-    closer.add(X(0), color, depth, 1.0)
+    closer.add(X(0), color, depth, timestamp=1.0)
     with pytest.raises(GraphError, match="added before"):
-        closer.add(X(0), color, depth, 2.0)
+        closer.add(X(0), color, depth, timestamp=2.0)
     with pytest.raises(GraphError, match="stamp"):
-        closer.add(X(1), color, depth, 1.0)
+        closer.add(X(1), color, depth, timestamp=1.0)
     with pytest.raises(GraphError, match="stamp"):
-        closer.add(X(1), color, depth, float("nan"))
+        closer.add(X(1), color, depth, timestamp=float("nan"))
     with pytest.raises(DatasetError, match="colour image"):
-        closer.add(X(1), color[:100], depth, 2.0)
+        closer.add(X(1), color[:100], depth, timestamp=2.0)
     with pytest.raises(DatasetError, match="metres"):
-        closer.add(X(1), color, (depth * 1000).astype(np.uint16), 2.0)
+        closer.add(X(1), color, (depth * 1000).astype(np.uint16), timestamp=2.0)
     with pytest.raises(GraphError, match="rigid"):
-        closer.add(X(1), color, depth, 2.0, np.diag([1.0, 1.0, -1.0, 1.0]))
-    closer.add(X(1), color, np.where(depth > 0, np.nan, depth), 2.0)  # missing depth may be NaN
+        closer.add(X(1), color, depth, np.diag([1.0, 1.0, -1.0, 1.0]), 2.0)
+    closer.add(X(1), color, np.where(depth > 0, np.nan, depth), timestamp=2.0)  # missing depth may be NaN
 
 
 def test_the_real_verification_finds_the_turn_before(room):
@@ -145,7 +145,7 @@ def test_the_real_verification_finds_the_turn_before(room):
     trajectory = room.poses()
     closer = LoopCloser(room.CAMERA, FirstAgain(), Config())
     for frame in room.frames(trajectory):
-        closer.add(X(frame.index), frame.color, frame.depth, frame.timestamp)
+        closer.add(X(frame.index), frame.color, frame.depth, timestamp=frame.timestamp)
     assert len(closer.closures) >= 20
     for closure in closer.closures:
         candidate = closure.constraint.candidate
