@@ -16,6 +16,7 @@ from semslam.config import Config
 from semslam.features import FeatureExtractor
 from semslam.geometry import invert, rotation_angle, transform_points
 from semslam.reprojection import measure
+from semslam.threads import one_blas_thread
 from semslam.types import Features, FloatArray, Frame, IntArray, Motion, Observations, TrackingStatus
 
 NOTHING: IntArray = np.zeros(0, dtype=np.int64)
@@ -61,7 +62,8 @@ class FeatureMapOdometry:
             DatasetError: the frame's size does not fit its intrinsics.
         """
         check_frame(frame)
-        motion = self._track(frame)
+        with one_blas_thread():
+            motion = self._track(frame)
         self._bridge.note(frame)
         return motion
 

@@ -333,7 +333,7 @@ class Config(Section):
     """Everything that decides a run besides the images."""
 
     seed: int = Field(0, ge=0, description="seed of everything that draws random numbers")
-    odometry: str = Field("feature", description="registered odometry")
+    odometry: str = Field("feature_map", description="registered odometry")
     detector: str = Field("semantic", description="registered loop detector")
     dataset: DatasetConfig = DatasetConfig()
     features: FeatureConfig = FeatureConfig()
