@@ -104,7 +104,7 @@ class FeatureMapConfig(Section):
     window: int = Field(6, gt=0, description="keyframes adjusted together")
     fixed: int = Field(6, ge=0, description="keyframes around them that hold them in place")
     adjustment_steps: int = Field(5, gt=0, description="steps of an adjustment, one a frame")
-    covariance_scale: float = Field(4.0, gt=0, description="factor that calibrates the covariance")
+    covariance_scale: float = Field(50.0, gt=0, description="factor that calibrates the covariance")
 
 
 class DenseConfig(Section):
