@@ -80,6 +80,8 @@ def study(seed: int, moved: bool, archway: bool = True, twin: bool = False) -> R
     openings = [add_window(room, "E", 1.7, 1.5), door_opening("N", 3.1)]
     if archway:
         openings.append(door_opening("W", 3.0))
+    else:
+        add_gallery(room, "W", 2.7, 1.55, ("painting_15", "poster_0", "painting_17", "poster_5"))
     room.shell("wall_study", "floor_dark", openings)
     room.against("E", 1.7, fittings.blinds(1.5, 0.7, "white_wood"), z=1.55)
     room.against("E", 1.7, furniture.desk(1.6, "pine", "metal"), out=0.05)

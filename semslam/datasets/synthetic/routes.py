@@ -78,9 +78,9 @@ TWIN_CORNERS = ((1.2, 0.0), (5.5, 0.0))
 TWINS = Route(
     (
         *shifted(_STUDY_TOUR, *TWIN_CORNERS[0]),
-        Stop(4.35, 4.85, 410), Stop(6.4, 4.9, 360), Stop(8.2, 4.85, 320), Stop(8.6, 4.2, 270),
+        Stop(4.34, 4.2, 424), Stop(4.65, 4.75, 374), Stop(6.4, 4.9, 360), Stop(8.2, 4.85, 320), Stop(8.6, 4.2, 270),
         *shifted(_STUDY_TOUR, *TWIN_CORNERS[1]),
-        Stop(8.5, 4.85, 500), Stop(6.4, 4.9, 540), Stop(4.7, 4.85, 590), Stop(4.3, 4.2, 625),
+        Stop(8.5, 4.85, 500), Stop(6.4, 4.9, 540), Stop(5.3, 4.9, 566), Stop(4.6, 4.8, 600), Stop(4.3, 4.2, 622),
         replace(_STUDY_TOUR[0], x=_STUDY_TOUR[0].x + TWIN_CORNERS[0][0], yaw=610),
     ),
     again=len(_STUDY_TOUR),
