@@ -1,0 +1,162 @@
+"""Segmentation: accuracy against time, and how steady labels are from frame to frame.
+
+    python benchmarks/segmentation.py speed  --data ../shared/data/nyuv2
+    python benchmarks/segmentation.py steady --sequence ../shared/data/redkitchen
+
+Prints rows of Markdown tables. Times are medians for one image on one thread, resizing and decoding included.
+"""
+
+import argparse
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import cv2
+import numpy as np
+import torch
+
+from loop.segmentation.build import build_segmenter
+from loop.segmentation.classes import GROUP_OF_LABEL
+from loop.segmentation.evaluation import evaluate
+from loop.segmentation.export import float_graph
+from loop.segmentation.network import build_mobilenet_deeplab, count_multiply_adds, count_parameters
+from loop.segmentation.onnx import OnnxSegmenter
+from loop.segmentation.photos import list_names, read_photo
+from loop.segmentation.segmenter import Segmenter
+from loop.segmentation.xception import build_xception_deeplab
+from semslam.config import load_config
+from semslam.datasets import open_dataset
+from semslam.datasets.dataset import Dataset
+from semslam.geometry import invert, transform_points
+from semslam.types import Frame, LabelMap
+
+SIZES = ((320, 240), (448, 336), (640, 480))
+WAYS = (("onnx", "int8"), ("onnx", "float32"), ("torch", "float32"))
+DEPTH_TOLERANCE = 0.05
+
+
+def median_ms(action: Callable[[], object], count: int) -> float:
+    """Median milliseconds of ``count`` runs after two to warm up."""
+    times = []
+    for _ in range(count + 2):
+        start = time.perf_counter()
+        action()
+        times.append(time.perf_counter() - start)
+    return 1e3 * float(np.median(times[2:]))
+
+
+def speed_table(data: Path, count: int, threads: int) -> None:
+    """Accuracy and time of each way and size."""
+    torch.set_num_threads(threads)
+    names = list_names(data, "val.txt")
+    photo = read_photo(data, names[0]).color
+    print("| network | way | input | mIoU | pixel accuracy | ms |\n|---|---|---|---|---|---|")
+    for size in SIZES:
+        for way, precision in WAYS:
+            settings = {"name": way, "precision": precision, "width": size[0], "height": size[1], "threads": threads}
+            segmenter = build_segmenter(load_config(overrides={"segmentation": settings}))
+            ms = median_ms(lambda s=segmenter: s.segment(photo), count)  # type: ignore[misc]
+            # PyTorch gives ONNX float32's labels (a test sees to it), so it is not scored again.
+            result = evaluate(segmenter, data, size=None if size == (640, 480) else size) if way == "onnx" else None
+            marks = f"{result.miou:.3f} | {result.pixel_accuracy:.3f}" if result else "as above | as above"
+            print(f"| MobileNetV2 | {way} {precision} | {size[0]}x{size[1]} | {marks} | {ms:.1f} |", flush=True)
+    graph = float_graph(build_xception_deeplab())
+    for size in SIZES[:1]:
+        xception = OnnxSegmenter(graph, size, threads)
+        ms = median_ms(lambda s=xception: s.segment(photo), max(3, count // 4))  # type: ignore[misc]
+        print(f"| Xception-65 | onnx float32 | {size[0]}x{size[1]} | untrained | untrained | {ms:.1f} |")
+
+
+def size_table() -> None:
+    """Parameters and multiply-adds of both backbones."""
+    print("| network | parameters | multiply-adds at 320x240 |\n|---|---|---|")
+    for name, build in (("MobileNetV2", build_mobilenet_deeplab), ("Xception-65", build_xception_deeplab)):
+        network = build()
+        adds = count_multiply_adds(network, 240, 320)
+        print(f"| {name} | {count_parameters(network) / 1e6:.2f} M | {adds / 1e9:.2f} G |")
+
+
+def steady_table(sequence: Path, gap: int, stride: int, segmenters: dict[str, Segmenter]) -> None:
+    """Share of scene points with the same label ``gap`` frames on, and overlap of the two frames' label sets."""
+    dataset = open_dataset(sequence)
+    print("| sequence | segmenter | labels that agree | groups that agree | label sets |\n|---|---|---|---|---|")
+    for name, segmenter in segmenters.items():
+        rows = []
+        for i in range(0, len(dataset) - gap, stride):
+            pair = dataset.frame(i), dataset.frame(i + gap)
+            first, second = (segmenter.segment(frame.color, frame.index) for frame in pair)
+            motion = true_motion(dataset, *pair)
+            if motion is not None:
+                rows.append((*agreement(pair[0], pair[1], first, second, motion), set_overlap(first, second)))
+        labels, groups, sets = np.nanmean(rows, axis=0)
+        print(f"| {dataset.name} | {name} | {labels:.3f} | {groups:.3f} | {sets:.3f} |", flush=True)
+
+
+def true_motion(dataset: Dataset, first: Frame, second: Frame) -> np.ndarray | None:
+    """T_second_first by the ground truth's nearest stamps, or None where it has none within 20 ms."""
+    truth = dataset.ground_truth
+    if truth is None:
+        return None
+    nearest = [int(np.abs(truth.timestamps - frame.timestamp).argmin()) for frame in (first, second)]
+    offsets = [abs(truth.timestamps[n] - f.timestamp) for n, f in zip(nearest, (first, second), strict=True)]
+    return invert(truth.poses[nearest[1]]) @ truth.poses[nearest[0]] if max(offsets) < 0.02 else None
+
+
+def agreement(
+    first: Frame, second: Frame, a: LabelMap, b: LabelMap, T_second_first: np.ndarray, step: int = 4
+) -> tuple[float, float]:
+    """Share of the points seen in both frames whose labels (and groups of labels) agree."""
+    camera = first.intrinsics
+    seen = first.depth[::step, ::step] > 0
+    points = transform_points(T_second_first, camera.back_project(first.depth, step))
+    labels = a.labels[::step, ::step][seen]
+    front = points[:, 2] > 0.1
+    points, labels = points[front], labels[front]
+    u, v = np.round(distort(second, points)).astype(int).T
+    inside = (u >= 0) & (u < camera.width) & (v >= 0) & (v < camera.height)
+    u, v, z, labels = u[inside], v[inside], points[inside, 2], labels[inside]
+    visible = np.abs(second.depth[v, u] - z) < DEPTH_TOLERANCE * z
+    if not visible.any():
+        return float("nan"), float("nan")
+    there, here = b.labels[v, u][visible], labels[visible]
+    return float((there == here).mean()), float((GROUP_OF_LABEL[there] == GROUP_OF_LABEL[here]).mean())
+
+
+def distort(frame: Frame, points: np.ndarray) -> np.ndarray:
+    """Raw pixels (N, 2) of camera-frame points (N, 3)."""
+    camera = frame.intrinsics
+    pixels, _ = cv2.projectPoints(points, np.zeros(3), np.zeros(3), camera.matrix, np.array(camera.distortion))
+    return np.clip(pixels.reshape(-1, 2), -1e6, 1e6)
+
+
+def set_overlap(a: LabelMap, b: LabelMap, share: float = 0.01) -> float:
+    """Labels in both over labels in either, among those on at least ``share`` of the image."""
+    sets = [set(np.flatnonzero(np.bincount(m.labels.ravel()) >= share * m.labels.size)) for m in (a, b)]
+    return len(sets[0] & sets[1]) / max(1, len(sets[0] | sets[1]))
+
+
+def main() -> None:
+    """Read the command line."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("table", choices=["speed", "size", "steady"])
+    parser.add_argument("--data", type=Path, default=Path("../shared/data/nyuv2"))
+    parser.add_argument("--sequence", type=Path, default=Path("../shared/data/redkitchen"))
+    parser.add_argument("--weights", type=Path, help="other weights for the table 'steady'")
+    parser.add_argument("--gap", type=int, default=5)
+    parser.add_argument("--stride", type=int, default=20)
+    parser.add_argument("--count", type=int, default=30)
+    parser.add_argument("--threads", type=int, default=1)
+    arguments = parser.parse_args()
+    cv2.setNumThreads(arguments.threads)
+    if arguments.table == "speed":
+        speed_table(arguments.data, arguments.count, arguments.threads)
+    elif arguments.table == "size":
+        size_table()
+    else:
+        settings = {"weights": str(arguments.weights)} if arguments.weights else {}
+        segmenters = {"onnx": build_segmenter(load_config(overrides={"segmentation": settings}))}
+        steady_table(arguments.sequence, arguments.gap, arguments.stride, segmenters)
+
+
+if __name__ == "__main__":
+    main()
