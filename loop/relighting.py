@@ -32,7 +32,8 @@ def shadow(color: UInt8Array, direction: float, offset: float, strength: float) 
 
 def noise(color: UInt8Array, sigma: float, rng: np.random.Generator) -> UInt8Array:
     """Add Gaussian noise of ``sigma`` grey values."""
-    return _pixels(_unit(color) + rng.normal(0, sigma / 255, color.shape).astype(np.float32))
+    added = rng.normal(0, sigma / 255, color.shape).astype(np.float32)
+    return _pixels(np.asarray(_unit(color) + added, dtype=np.float32))
 
 
 def relight(color: UInt8Array, rng: np.random.Generator) -> UInt8Array:
@@ -53,7 +54,7 @@ def relight(color: UInt8Array, rng: np.random.Generator) -> UInt8Array:
 
 
 def _unit(color: UInt8Array) -> Float32Array:
-    return color.astype(np.float32) / 255
+    return np.divide(color, 255, dtype=np.float32)
 
 
 def _pixels(unit: Float32Array) -> UInt8Array:
