@@ -1,8 +1,12 @@
 """Fixtures that many tests use."""
 
+import os
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
+
+# Before numpy is imported, as the command line does: idle BLAS threads spin and slow the tests down.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import cv2
 import numpy as np
