@@ -55,8 +55,11 @@ def exp_so3(rotation_vector: npt.ArrayLike) -> FloatArray:
 
 
 def log_so3(R: FloatArray) -> FloatArray:
-    """Rotation vector (3,) in radians of a rotation (3, 3)."""
-    return np.asarray(cv2.Rodrigues(np.ascontiguousarray(R))[0], dtype=np.float64).ravel()
+    """Rotation vector (3,) in radians of a rotation (3, 3); exact for the smallest angles and for half turns."""
+    q = rotations_to_quaternions(R)[0]
+    length = float(np.linalg.norm(q[:3]))
+    factor = 2.0 if length < 1e-12 else 2.0 * float(np.arctan2(length, q[3])) / length
+    return np.asarray(factor * q[:3])
 
 
 def orthonormalise(T: FloatArray) -> FloatArray:
