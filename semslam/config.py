@@ -309,7 +309,6 @@ class BundleConfig(Section):
     baseline: float = Field(0.08, gt=0, description="metres between the virtual stereo pair's cameras")
     outlier: float = Field(2.8, gt=0, description="whitened reprojection error at which an observation is dropped")
     min_views: int = Field(2, gt=1, description="keyframes that must see a landmark")
-    min_observations: int = Field(20, gt=0, description="keyframes with fewer are held by odometry too")
 
 
 class BackendConfig(Section):
