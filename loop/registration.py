@@ -1,12 +1,11 @@
 """Registration of two keyframes' clouds, with Open3D."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from semslam.threads import one_open3d_thread
 from semslam.types import Cloud, FloatArray, IntArray
 
 MAX_ITERATIONS = 30
@@ -41,7 +40,7 @@ def refine(source: Cloud, target: Cloud, T_target_source: FloatArray, distances:
     """
     from open3d.pipelines import registration
 
-    with one_thread():
+    with one_open3d_thread():
         moving, fixed = _open3d_cloud(source), _open3d_cloud(target)
         T = T_target_source
         for distance in distances:
@@ -56,7 +55,7 @@ def measure_fit(source: Cloud, target: Cloud, T_target_source: FloatArray, dista
     """Count the source points that lie within ``distance`` metres of the target."""
     from open3d.pipelines import registration
 
-    with one_thread():
+    with one_open3d_thread():
         found = registration.evaluate_registration(
             _open3d_cloud(source), _open3d_cloud(target), distance, T_target_source
         )
@@ -74,19 +73,6 @@ def plane_information(source: Cloud, target: Cloud, T_target_source: FloatArray,
     jacobian = np.hstack([np.cross(points, normals), normals])
     information: FloatArray = jacobian.T @ jacobian
     return information
-
-
-@contextmanager
-def one_thread() -> Iterator[None]:
-    """Run Open3D on one thread: on several, ICP's sums come in a different order each time."""
-    from open3d import utility
-
-    before = utility.get_max_threads()
-    utility.set_max_threads(1)
-    try:
-        yield
-    finally:
-        utility.set_max_threads(before)
 
 
 def _open3d_cloud(cloud: Cloud) -> Any:

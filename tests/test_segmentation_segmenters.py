@@ -4,11 +4,11 @@ import cv2
 import numpy as np
 import pytest
 
+from loop.backbone import Backbone
 from loop.segmentation.build import build_segmenter
 from loop.segmentation.checkpoint import SHIPPED
 from loop.segmentation.classes import NYU40_NAMES
 from loop.segmentation.decoding import decode
-from loop.segmentation.features import FeatureNetwork
 from loop.segmentation.folder import FolderSegmenter
 from loop.segmentation.overlay import draw_overlay
 from loop.segmentation.segmenter import Segmenter
@@ -151,13 +151,13 @@ def test_folder_faults_are_one_sentence(tmp_path, labels_folder):
         FolderSegmenter(labels_folder).segment(some_image(), 1)
 
 
-def test_features_are_a_sixteenth(labels_folder):
-    network = FeatureNetwork.from_config(load_config())
-    features = network.extract(some_image())
-    assert features.shape == (15, 20, 96)
-    assert features.dtype == np.float32
-    assert features.std() > 0
-    assert np.array_equal(features, network.extract(some_image()))
+def test_features_are_a_sixteenth():
+    backbone = Backbone.from_config(load_config())
+    first, again = backbone.encode(some_image()), backbone.encode(some_image())
+    assert (first.middle.shape, first.high.shape) == ((15, 20, 96), (15, 20, 320))
+    assert first.middle.dtype == np.float32
+    assert first.middle.std() > 0
+    assert np.array_equal(first.middle, again.middle)
 
 
 def test_overlay_has_a_legend_of_what_is_there():

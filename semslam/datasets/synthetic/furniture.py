@@ -22,13 +22,6 @@ def table(
     return [top, apron, *legs(width, depth, height - thick, material, label)]
 
 
-def round_table(radius: float, height: float, material: str) -> list[Part]:
-    """A round top on a turned foot."""
-    foot = [(0.0, 0.0), (0.24, 0.0), (0.22, 0.03), (0.04, 0.06), (0.035, height - 0.06), (radius * 0.5, height - 0.03)]
-    top = [(radius * 0.5, height - 0.03), (radius, height - 0.03), (radius, height), (0.0, height)]
-    return [turned(foot + top, (0, radius, 0), material, labels.TABLE, segments=28)]
-
-
 def chair(material: str, seat: str) -> list[Part]:
     """A dining chair with a cushion and a slatted back; its back is at y = 0, the sitter looks towards +y."""
     parts = legs(0.42, 0.44, 0.44, material, labels.CHAIR, 0.038)
