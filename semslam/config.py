@@ -161,6 +161,8 @@ class TrainingConfig(Section):
     freeze_early: bool = Field(False, description="leave the encoder's stem and first blocks, to 1/4, as they are")
     warmup: float = Field(0.08, ge=0, lt=1, description="share of the steps in which the rate climbs")
     average: float = Field(0.998, ge=0, lt=1, description="decay of the weight average that is kept")
+    strong_share: float = Field(0.0, ge=0, le=1, description="share of views taken close, rolled, blurred, badly lit")
+    rare_share: float = Field(0.0, ge=0, le=1, description="share of views drawn by class, every class as often")
     pseudo: tuple[Path, ...] = Field((), description="more folders of photos whose labels a teacher made")
     pseudo_share: float = Field(0.4, ge=0, lt=1, description="share of views drawn from those")
     threads: int = Field(1, gt=0, description="training threads")

@@ -12,7 +12,7 @@ from loop.segmentation.evaluation import confusion_matrix, evaluate, score
 from loop.segmentation.onnx import load_graph
 from loop.segmentation.photos import Photo, read_photo, read_photos
 from loop.segmentation.self_training import Teacher, label_folder
-from loop.segmentation.training import class_weights, learning_rate, train
+from loop.segmentation.training import class_weights, learning_rate, photos_by_class, train
 from loop.segmentation.training_log import read_log
 from semslam.config import load_config
 from semslam.errors import DatasetError, ModelError
@@ -66,9 +66,9 @@ def test_resumed_training_ends_with_the_same_weights(rooms, tmp_path):
 def test_training_learns_and_its_outputs_serve(rooms, tmp_path):
     losses = []
     out = tmp_path / "run"
-    weights = train(rooms, settings(epochs=10, start=str(SHIPPED)), out, lambda p: losses.append(p.loss))
+    weights = train(rooms, settings(epochs=20, start=str(SHIPPED)), out, lambda p: losses.append(p.loss))
     assert np.mean(losses[-4:]) < 0.7 * np.mean(losses[:4])
-    assert [row[0] for row in read_log(out / "training.csv")] == [20]
+    assert [row[0] for row in read_log(out / "training.csv")] == [20, 40]
     assert (out / "training.png").stat().st_size > 1000
     for path in (weights, out / "weights.onnx"):
         config = load_config(overrides={"segmentation": {**SIZE, "weights": str(path)}})
@@ -128,18 +128,29 @@ def test_views_are_drawn_from_the_seed(rooms):
     assert not np.array_equal(a[0], c[0])
 
 
-def test_views_keep_labels_on_their_pixels():
+@pytest.mark.parametrize("strong_share", [0.0, 1.0])
+def test_views_keep_labels_on_their_pixels(strong_share):
     """Where the view shows bright it must say 2, where dark 1, whatever the zoom, turn and mirroring."""
     labels = np.ones((96, 128), np.uint8)
     labels[:, 64:] = 2
     color = np.where(labels[..., None] == 2, 230, 20).repeat(3, 2).astype(np.uint8)
     for seed in range(40):
-        view, drawn = random_view(Photo("x", color, labels), 64, 48, np.random.default_rng(seed))
+        view, drawn = random_view(Photo("x", color, labels), 64, 48, np.random.default_rng(seed), strong_share)
         assert view.shape == (48, 64, 3)
         inner = cv2.erode((drawn == 2).astype(np.uint8), np.ones((15, 15))) > 0
         outer = cv2.erode((drawn == 1).astype(np.uint8), np.ones((15, 15))) > 0
         if inner.any() and outer.any():
             assert view[inner].mean() > view[outer].mean() + 40
+
+
+def test_photos_are_found_by_their_classes():
+    color = np.zeros((10, 10, 3), np.uint8)
+    plain, rare = (Photo(name, color, np.ones((10, 10), np.uint8)) for name in ("plain", "rare"))
+    rare.labels[0, 0] = 5
+    assert [[photo.name for photo in group] for group in photos_by_class([plain, rare])] == [
+        ["plain", "rare"],
+        ["rare"],
+    ]
 
 
 def test_rare_classes_weigh_more():

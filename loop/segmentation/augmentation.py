@@ -1,5 +1,7 @@
 """Random views of a labelled photo: what a hand-held camera does to an image that a photographer would not take."""
 
+from dataclasses import dataclass
+
 import cv2
 import numpy as np
 
@@ -7,72 +9,92 @@ from loop.segmentation.photos import Photo, UInt8Array
 from semslam.geometry import Float32Array, FloatArray
 
 GREY = (127, 127, 127)
-STRONG_ROTATION = 45.0
-CLOSE, TURNED = 0.1, 0.2
+PLAIN_LOG_ZOOM = (-0.22, 0.69)
+PLAIN_ROLL = 5.0
+PLAIN_LIGHT = 0.4
+STRONG_ROLL = 45.0
 HALF = 0.6
 
 
-def random_view(photo: Photo, width: int, height: int, rng: np.random.Generator) -> tuple[UInt8Array, UInt8Array]:
-    """Draw a view: zoomed, turned, mirrored, cropped, relit, blurred, noisy.
+def random_view(
+    photo: Photo, width: int, height: int, rng: np.random.Generator, strong_share: float = 0.0
+) -> tuple[UInt8Array, UInt8Array]:
+    """Draw a view: zoomed, mirrored, cropped and a little relit; or a strong one, as from a hand in motion.
 
     Args:
         photo: what is looked at.
         width: of the view in pixels.
         height: of the view in pixels.
         rng: draws everything.
+        strong_share: share of views that are taken from close by or turned, badly lit, blurred and noisy.
 
     Returns:
         Colour (height, width, 3) and labels (height, width), 0 where the view leaves the photo.
     """
     color, labels = photo.color, photo.labels
-    matrix, scale = _placement(color.shape[1], color.shape[0], width, height, rng)
+    strong = bool(rng.random() < strong_share)
+    placement = _strong_placement(rng) if strong else _plain_placement(rng)
+    matrix, scale = placement.map_of(color.shape[1], color.shape[0], width, height, rng)
     view_labels = cv2.warpAffine(labels, matrix, (width, height), flags=cv2.INTER_NEAREST, borderValue=0)
     if scale < HALF:  # bilinear sampling of a photo more than half as large again would alias
         color = cv2.resize(color, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA).astype(np.uint8)
         matrix = matrix * np.array([2.0, 2.0, 1.0])
     view = cv2.warpAffine(color, matrix, (width, height), flags=cv2.INTER_LINEAR, borderValue=GREY)
-    return _degrade(_relight(view.astype(np.float32), rng), rng), view_labels.astype(np.uint8)
+    light = _relight(view.astype(np.float32), rng, 1.0 if strong else PLAIN_LIGHT)
+    lit = _degrade(light, rng) if strong else np.clip(np.round(light), 0, 255).astype(np.uint8)
+    return lit, view_labels.astype(np.uint8)
 
 
-def _placement(
-    inside_width: int, inside_height: int, width: int, height: int, rng: np.random.Generator
-) -> tuple[FloatArray, float]:
-    """Affine map (2, 3) from photo to view, and view pixels per photo pixel.
+@dataclass(frozen=True, slots=True)
+class _Placement:
+    """Where a view looks from: zoom against a view of the whole photo, and roll in degrees."""
 
-    Most views are near to how the photo was taken; the others are taken closer, as over a tabletop, or
-    turned.
-    """
-    fit = min(width / inside_width, height / inside_height)
-    kind = rng.random()
-    low, high = (1.6, 3.3) if kind < CLOSE else (0.8, 1.7) if kind < CLOSE + TURNED else (0.95, 1.5)
-    zoom = np.exp(rng.uniform(np.log(low), np.log(high)))
-    spread = STRONG_ROTATION if CLOSE / 2 <= kind < CLOSE + TURNED else 6.0
-    angle = np.deg2rad(rng.uniform(-spread, spread))
-    mirror = -1.0 if rng.random() < 0.5 else 1.0
-    scale = fit * zoom
-    aspect = np.exp(rng.uniform(-0.12, 0.12))
-    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-    A = turn @ np.diag([mirror * scale * aspect, scale / aspect])
-    # The view's centre looks at a point that keeps the view on the photo where the zoom allows it.
-    slack = np.maximum(np.array([inside_width, inside_height]) - np.array([width, height]) / scale, 0.0) / 2.0
-    center = np.array([inside_width, inside_height]) / 2.0 + rng.uniform(-1.0, 1.0, 2) * (slack + 0.05 * inside_width)
-    offset = np.array([width, height]) / 2.0 - A @ center
-    return np.column_stack([A, offset]), float(scale)
+    zoom: float
+    roll: float
+
+    def map_of(
+        self, inside_width: int, inside_height: int, width: int, height: int, rng: np.random.Generator
+    ) -> tuple[FloatArray, float]:
+        """Affine map (2, 3) from photo to view with a random centre, and view pixels per photo pixel."""
+        scale = min(width / inside_width, height / inside_height) * self.zoom
+        angle = np.deg2rad(self.roll)
+        mirror = -1.0 if rng.random() < 0.5 else 1.0
+        aspect = np.exp(rng.uniform(-0.12, 0.12))
+        turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+        A = turn @ np.diag([mirror * scale * aspect, scale / aspect])
+        # The view's centre looks at a point that keeps the view on the photo where the zoom allows it.
+        slack = np.maximum(np.array([inside_width, inside_height]) - np.array([width, height]) / scale, 0.0) / 2.0
+        middle = np.array([inside_width, inside_height]) / 2.0
+        center = middle + rng.uniform(-1.0, 1.0, 2) * (slack + 0.03 * inside_width)
+        offset = np.array([width, height]) / 2.0 - A @ center
+        return np.column_stack([A, offset]), float(scale)
 
 
-def _relight(image: Float32Array, rng: np.random.Generator) -> Float32Array:
-    """Exposure, gamma, contrast, white balance and saturation."""
+def _plain_placement(rng: np.random.Generator) -> _Placement:
+    """Near to how the photo was taken."""
+    return _Placement(float(np.exp(rng.uniform(*PLAIN_LOG_ZOOM))), rng.uniform(-PLAIN_ROLL, PLAIN_ROLL))
+
+
+def _strong_placement(rng: np.random.Generator) -> _Placement:
+    """Half of the views close, as over a tabletop; two thirds rolled."""
+    low, high = (1.6, 3.3) if rng.random() < 0.5 else (0.8, 1.7)
+    spread = STRONG_ROLL if rng.random() < 0.67 else PLAIN_ROLL
+    return _Placement(float(np.exp(rng.uniform(np.log(low), np.log(high)))), rng.uniform(-spread, spread))
+
+
+def _relight(image: Float32Array, rng: np.random.Generator, strength: float) -> Float32Array:
+    """Exposure, gamma, contrast, white balance and saturation; ``strength`` scales all of them."""
     if rng.random() < 0.6:
-        image = image * np.exp(rng.uniform(-0.5, 0.4)).astype(np.float32)
-        image = image * np.exp(rng.normal(0.0, 0.08, 3)).astype(np.float32)
+        image = image * np.exp(strength * rng.uniform(-0.5, 0.4)).astype(np.float32)
+        image = image * np.exp(strength * rng.normal(0.0, 0.08, 3)).astype(np.float32)
     if rng.random() < 0.5:
         grey = image.mean(2, keepdims=True)
-        image = grey + (image - grey) * np.float32(rng.uniform(0.3, 1.5))
+        image = grey + (image - grey) * np.float32(1.0 + strength * rng.uniform(-0.7, 0.5))
     if rng.random() < 0.4:
         mean = image.mean()
-        image = mean + (image - mean) * np.float32(rng.uniform(0.6, 1.4))
+        image = mean + (image - mean) * np.float32(1.0 + strength * rng.uniform(-0.4, 0.4))
     if rng.random() < 0.3:
-        gamma = np.exp(rng.uniform(-0.5, 0.5))
+        gamma = np.exp(strength * rng.uniform(-0.5, 0.5))
         image = 255.0 * np.power(np.clip(image, 0, 255) / 255.0, np.float32(gamma))
     return image.astype(np.float32)
 

@@ -82,6 +82,13 @@ def class_weights(photos: list[Photo]) -> Tensor:
     return torch.tensor(np.clip(weights, *WEIGHT_LIMITS), dtype=torch.float32)
 
 
+def photos_by_class(photos: list[Photo]) -> list[list[Photo]]:
+    """For each class that occurs, the photos of which it covers at least a hundredth."""
+    shares = np.stack([np.bincount(p.labels.ravel(), minlength=CLASS_COUNT + 1)[1:] / p.labels.size for p in photos])
+    groups = [[photo for photo, has in zip(photos, column, strict=True) if has] for column in (shares >= 0.01).T]
+    return [group for group in groups if group] or [photos]
+
+
 def learning_rate(step: int, steps: int, warmup: float) -> float:
     """Share of the peak rate: a linear climb, then a cosine to nothing."""
     rise = max(1, round(steps * warmup))
@@ -98,6 +105,7 @@ class _Run:
         self.seed, self.out = config.seed, out
         self.size = input_size(config.segmentation)
         self.photos = read_photos(directory, "train.txt")
+        self.by_class = photos_by_class(self.photos)
         self.pseudo = [p for folder in settings.pseudo for p in read_photos(folder, "train.txt")]
         self.steps = max(1, settings.epochs * len(self.photos) // settings.batch)
         self.step = 0
@@ -127,12 +135,17 @@ class _Run:
         """Views (B, 3, H, W) in -1..1 and class indices (B, H, W), -1 = void."""
         views, labels = [], []
         for _ in range(count):
-            pool = self.pseudo if self.pseudo and rng.random() < self.settings.pseudo_share else self.photos
-            view, label = random_view(pool[int(rng.integers(len(pool)))], *self.size, rng)
+            view, label = random_view(self._draw(rng), *self.size, rng, self.settings.strong_share)
             views.append(view)
             labels.append(label)
         images = torch.from_numpy(np.stack(views)).permute(0, 3, 1, 2).float() / 127.5 - 1.0
         return images, torch.from_numpy(np.stack(labels).astype(np.int64)) - 1
+
+    def _draw(self, rng: np.random.Generator) -> Photo:
+        pool = self.pseudo if self.pseudo and rng.random() < self.settings.pseudo_share else self.photos
+        if pool is self.photos and rng.random() < self.settings.rare_share:
+            pool = self.by_class[int(rng.integers(len(self.by_class)))]
+        return pool[int(rng.integers(len(pool)))]
 
     def advance(self) -> float:
         """One step of the optimiser, whose views depend on seed and step alone; returns its loss."""
