@@ -11,13 +11,15 @@ import numpy.typing as npt
 from semslam.camera import Intrinsics
 from semslam.config import FeatureConfig
 from semslam.geometry import Float32Array, FloatArray, invert, make_transform
-from semslam.reprojection import measure, refine_pose
+from semslam.reprojection import measure, refine_pose, squared_errors
 from semslam.types import Features, Frame, IntArray, UInt8Array
 
 PATCH = 31
 """Side of ORB's patch in pixels; an image must be larger to have keypoints."""
 BORDER = 19
 """Pixels at the image's border without keypoints, at each pyramid level."""
+NEAR = 2.0
+"""How many times the threshold a match may be off a pose from a few matches and yet take part in its refinement."""
 
 
 class FeatureExtractor:
@@ -181,11 +183,15 @@ def solve_pnp(
     if not found or inliers is None or len(inliers) < 6:
         return None
     T_cam_ref = make_transform(cv2.Rodrigues(rotation)[0], translation)
+    T_ref_cam, gate = invert(T_cam_ref), threshold_px**2
     seen = measure(pixels, np.zeros(len(pixels)), np.ones(len(pixels)))
-    refined = refine_pose(invert(T_cam_ref), points, seen, intrinsics, gate=threshold_px**2)
-    if refined is None or refined.inliers.sum() < 6:
+    # Only what is near: most matches may be wrong, and together they would pull the pose away.
+    near = squared_errors(T_ref_cam, points, seen, intrinsics) <= NEAR**2 * gate
+    refined = refine_pose(T_ref_cam, points[near], seen.take(near), intrinsics, gate)
+    if refined is None:
         return None
-    return PnpResult(refined.T_ref_cam, refined.inliers, refined.covariance)
+    agrees = squared_errors(refined.T_ref_cam, points, seen, intrinsics) <= gate
+    return PnpResult(refined.T_ref_cam, agrees, refined.covariance) if agrees.sum() >= 6 else None
 
 
 def _ransac(threshold_px: float, seed: int) -> cv2.UsacParams:

@@ -115,6 +115,17 @@ def test_pnp_recovers_the_pose_among_wrong_matches(seed: int) -> None:
     assert found.inliers[~wrong].mean() > 0.95
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_pnp_is_not_pulled_away_where_most_matches_are_wrong(seed: int) -> None:
+    points, pixels, T_ref_cam, wrong = scene(seed, outliers=0.8, noise=0.3)
+    pixels[wrong, 0] = pixels[wrong, 0] / 4  # wrong matches that lean to one side
+    found = solve_pnp(points, pixels, CAMERA)
+    assert found is not None
+    error = invert(T_ref_cam) @ found.T_ref_cam
+    assert np.linalg.norm(error[:3, 3]) < 0.02
+    assert found.inliers[~wrong].mean() > 0.9
+
+
 def test_pnp_covariance_is_that_of_its_errors() -> None:
     squared = []
     for seed in range(60):
