@@ -147,10 +147,8 @@ def test_photos_are_found_by_their_classes():
     color = np.zeros((10, 10, 3), np.uint8)
     plain, rare = (Photo(name, color, np.ones((10, 10), np.uint8)) for name in ("plain", "rare"))
     rare.labels[0, 0] = 5
-    assert [[photo.name for photo in group] for group in photos_by_class([plain, rare])] == [
-        ["plain", "rare"],
-        ["rare"],
-    ]
+    names = [[photo.name for photo in group] for group in photos_by_class([plain, rare])]
+    assert names == [["plain", "rare"], ["rare"]]
 
 
 def test_rare_classes_weigh_more():
