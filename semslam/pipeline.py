@@ -1,9 +1,10 @@
-"""A whole run: dataset -> Slam -> RunResult. It reads frames, keeps the time and reports progress."""
+"""A whole run: dataset -> Slam -> RunResult, or recorded motions in the odometry's place; keeps the time."""
 
 import resource
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from functools import partial
 
 from semslam.config import Config
 from semslam.datasets.dataset import Dataset
@@ -11,6 +12,7 @@ from semslam.datasets.prefetch import prefetch
 from semslam.errors import DatasetError
 from semslam.ledger import LedgerEntry
 from semslam.metrics import Metrics, TimeMetrics
+from semslam.recording import RecordedFrame, Recording, checksum
 from semslam.scoring import score_run
 from semslam.slam import FrameState, Slam, SlamResult
 from semslam.stopwatch import Stopwatch
@@ -35,6 +37,7 @@ class RunResult:
         ground_truth: the dataset's, or None.
         ledger: one entry per loop candidate.
         metrics: all figures.
+        recording: what the front end made of the sequence, for a replay.
         notes: what was mended or left out, a sentence each.
     """
 
@@ -45,6 +48,7 @@ class RunResult:
     ground_truth: Trajectory | None
     ledger: tuple[LedgerEntry, ...]
     metrics: Metrics
+    recording: Recording
     notes: tuple[str, ...]
 
 
@@ -64,35 +68,93 @@ def run(dataset: Dataset, config: Config | None = None, progress: Progress = _si
         ModelError: the network's weights are missing or damaged.
         DatasetError: no frame at all could be read or tracked.
     """
-    config = config or Config()
-    stopwatch, clock = Stopwatch(), _Clock()
-    slam = Slam.from_config(config, stopwatch)
-    unreadable: list[str] = []
-    interrupted = False
-    try:
-        for index, item in enumerate(prefetch(dataset)):
-            state = None
+    session = _Session(dataset, config or Config())
+    session.drive(session.track(), progress)
+    return session.result()
+
+
+def replay(dataset: Dataset, recording: Recording, config: Config, progress: Progress = _silent) -> RunResult:
+    """Repeat detection, verification and back end on a saved front end; images are read at keyframes alone.
+
+    With the settings of the recorded run its trajectory comes out again to the bit.
+
+    Args:
+        dataset: the sequence that was recorded.
+        recording: what the front end made of it; of an interrupted run, the frames until then.
+        config: settings; those of the front end must be the recorded run's (``SavedFrontEnd.check_settings``).
+        progress: called after each frame with its index and its state.
+
+    Raises:
+        ConfigError: a name or setting is unknown.
+        ModelError: the network's weights are missing or damaged.
+        DatasetError: it is another sequence, or a keyframe's image cannot be read.
+    """
+    recording.check(dataset)
+    session = _Session(dataset, config)
+    session.drive(session.follow(recording), progress)
+    return session.result()
+
+
+class _Session:
+    """A run between its first frame and its result."""
+
+    def __init__(self, dataset: Dataset, config: Config) -> None:
+        self._dataset, self._config = dataset, config
+        self._stopwatch, self._clock = Stopwatch(), _Clock()
+        self._slam = Slam.from_config(config, self._stopwatch)
+        self._unreadable: list[str] = []
+        self._checksum = 0
+        self._interrupted = False
+
+    def track(self) -> Iterator[tuple[int, FrameState | None]]:
+        """Read and track every frame."""
+        for index, item in enumerate(prefetch(self._dataset)):
             if isinstance(item, DatasetError):
-                unreadable.append(str(item))
+                self._unreadable.append(str(item))
+                yield index, None
             else:
-                state = slam.process(item)
-            progress(index, state)
-    except KeyboardInterrupt:
-        interrupted = True
-    if not slam.keyframes:
-        raise DatasetError(unreadable[0] if unreadable else f"No frame of {dataset.name} could be tracked.")
-    result = slam.finish()
-    scores = score_run(dataset, config, result, len(unreadable), interrupted, clock.read(len(result.frames), stopwatch))
-    return RunResult(
-        config=config,
-        slam=result,
-        odometry=scores.odometry,
-        trajectory=scores.trajectory,
-        ground_truth=dataset.ground_truth,
-        ledger=scores.ledger,
-        metrics=scores.metrics,
-        notes=(*dataset.notes, *unreadable),
-    )
+                self._checksum = self._checksum or checksum(item)
+                yield index, self._slam.process(item)
+
+    def follow(self, recording: Recording) -> Iterator[tuple[int, FrameState]]:
+        """Go along recorded motions."""
+        self._unreadable.extend(recording.unreadable)
+        self._checksum, self._interrupted = recording.checksum, recording.interrupted
+        for frame in recording.frames:
+            read = partial(self._dataset.frame, frame.index)
+            yield frame.index, self._slam.follow(frame.index, frame.timestamp, frame.motion, read)
+
+    def drive(self, states: Iterable[tuple[int, FrameState | None]], progress: Progress) -> None:
+        """Take frame after frame until the last, or until Ctrl-C."""
+        try:
+            for index, state in states:
+                progress(index, state)
+        except KeyboardInterrupt:
+            self._interrupted = True
+
+    def result(self) -> RunResult:
+        """Optimise, score and join what was found."""
+        if not self._slam.keyframes:
+            raise DatasetError((*self._unreadable, f"No frame of {self._dataset.name} could be tracked.")[0])
+        slam = self._slam.finish()
+        times = self._clock.read(len(slam.frames), self._stopwatch)
+        scores = score_run(self._dataset, self._config, slam, len(self._unreadable), self._interrupted, times)
+        return RunResult(
+            config=self._config,
+            slam=slam,
+            odometry=scores.odometry,
+            trajectory=scores.trajectory,
+            ground_truth=self._dataset.ground_truth,
+            ledger=scores.ledger,
+            metrics=scores.metrics,
+            recording=Recording(
+                tuple(RecordedFrame(state.index, state.timestamp, state.motion) for state in slam.frames),
+                tuple(self._unreadable),
+                self._interrupted,
+                self._checksum,
+            ),
+            notes=(*self._dataset.notes, *self._unreadable),
+        )
 
 
 class _Clock:

@@ -25,6 +25,7 @@ from semslam.map_cloud import write_map
 from semslam.metrics import Metrics
 from semslam.pipeline import RunResult
 from semslam.presentation import present
+from semslam.recording import write_recording
 from semslam.types import Keyframe, Trajectory
 
 
@@ -65,7 +66,9 @@ def new_run_directory(root: Path, sequence: str, detector: str) -> Path:
     return path
 
 
-def write_run(result: RunResult, dataset: Dataset, directory: Path, plots: bool = True) -> None:
+def write_run(
+    result: RunResult, dataset: Dataset, directory: Path, plots: bool = True, source: str | None = None
+) -> None:
     """Write a run folder: it appears whole, or not at all; an earlier run of that name is replaced.
 
     Args:
@@ -73,6 +76,7 @@ def write_run(result: RunResult, dataset: Dataset, directory: Path, plots: bool 
         dataset: where it came from; images of the loops are read again for the report.
         directory: the run folder itself.
         plots: whether to draw plots and the report.
+        source: what the dataset was opened by, so that a replay finds it again.
 
     Raises:
         ResultsError: the folder holds something else, or cannot be written (such as a full disk).
@@ -90,6 +94,7 @@ def write_run(result: RunResult, dataset: Dataset, directory: Path, plots: bool 
         write_ledger(work / "loops.jsonl", result.ledger)
         write_g2o(work / "graph.g2o", result.slam.solution)
         write_map(work / "map.ply", result.slam)
+        write_recording(work, result.recording, source)
         if plots:
             present(result, dataset, work)
 

@@ -1,5 +1,6 @@
 """The algorithm: a frame in, a state out. It reads no files, writes none and prints nothing."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Self
 
@@ -40,18 +41,26 @@ class FrameState:
     Attributes:
         index: its place in the sequence.
         timestamp: seconds.
-        status: how far its pose can be trusted.
-        map_id: the odometry's map it belongs to.
+        motion: what the odometry said of it; landmarks are kept of keyframes alone.
         T_odom_cam: (4, 4) causal odometry pose.
         keyframe: id of the keyframe made of it, if any.
     """
 
     index: int
     timestamp: float
-    status: TrackingStatus
-    map_id: int
+    motion: Motion
     T_odom_cam: FloatArray
     keyframe: int | None
+
+    @property
+    def status(self) -> TrackingStatus:
+        """How far its pose can be trusted."""
+        return self.motion.status
+
+    @property
+    def map_id(self) -> int:
+        """The odometry's map it belongs to."""
+        return self.motion.map_id
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -164,19 +173,30 @@ class Slam:
         """
         with self._stopwatch.stage("odometry"):
             motion = self._odometry.track(frame)
+        return self.follow(frame.index, frame.timestamp, motion, lambda: frame)
+
+    def follow(self, index: int, timestamp: float, motion: Motion, read: Callable[[], Frame]) -> FrameState:
+        """Go on with a frame whose motion is known, such as one that was tracked in an earlier run.
+
+        Args:
+            index: its place in the sequence.
+            timestamp: seconds.
+            motion: what an odometry said of it.
+            read: gives its images; called only where the frame becomes a keyframe.
+
+        Raises:
+            DatasetError: the images are needed and cannot be read.
+        """
         self._T_odom_cam = orthonormalise(self._T_odom_cam @ motion.T_prev_cur)
         for anchor in self._anchors.values():
             anchor.extend(motion)
         keyframe = None
-        if motion.status is not TrackingStatus.LOST and self._policy.is_due(
-            frame.timestamp, self._T_odom_cam, motion.map_id
-        ):
-            keyframe = self._add_keyframe(frame, motion)
+        if motion.status is not TrackingStatus.LOST and self._policy.is_due(timestamp, self._T_odom_cam, motion.map_id):
+            keyframe = self._add_keyframe(read(), motion)
         state = FrameState(
-            index=frame.index,
-            timestamp=frame.timestamp,
-            status=motion.status,
-            map_id=motion.map_id,
+            index=index,
+            timestamp=timestamp,
+            motion=motion if keyframe is not None else replace(motion, observations=None),
             T_odom_cam=self._T_odom_cam,
             keyframe=None if keyframe is None else keyframe.id,
         )

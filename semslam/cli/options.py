@@ -10,7 +10,8 @@ from semslam.errors import ConfigError
 if TYPE_CHECKING:
     from semslam.config import Config
 
-Sequence = Annotated[str, typer.Argument(help="A sequence: a folder (TUM, 7-Scenes, generic), a .bag or synthetic:...")]
+SEQUENCE_HELP = "A sequence: a folder (TUM, 7-Scenes, generic), a .bag or synthetic:..."
+Sequence = Annotated[str, typer.Argument(help=SEQUENCE_HELP)]
 Odometry = Annotated[str | None, typer.Option("--odometry", help="Registered odometry.")]
 Detector = Annotated[str | None, typer.Option("--detector", help="Registered loop detector; 'none' for no loops.")]
 Loader = Annotated[str | None, typer.Option("--loader", help="Dataset loader; guessed from the path by default.")]

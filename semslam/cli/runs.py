@@ -9,12 +9,13 @@ import typer
 from semslam.cli import options
 from semslam.cli.command import Command, example
 from semslam.cli.console import bar, frame_progress, metrics_table, out, remark, remarks
-from semslam.errors import ResultsError
+from semslam.errors import ConfigError, ResultsError
 
 if TYPE_CHECKING:
     from semslam.config import Config
     from semslam.datasets.dataset import Dataset
     from semslam.metrics import Metrics
+    from semslam.recording import Recording, SavedFrontEnd
 
 RUNS = Path("runs")
 DEMO_SEQUENCE = "synthetic:house"
@@ -27,9 +28,12 @@ Plots = Annotated[bool, typer.Option("--plots/--no-plots", help="Draw plots and 
 
 
 def run_command(
-    sequence: options.Sequence,
+    sequence: Annotated[
+        str | None, typer.Argument(help=f"{options.SEQUENCE_HELP} With --from: where it is now.")
+    ] = None,
     detector: options.Detector = None,
     odometry: options.Odometry = None,
+    saved_run: Annotated[Path | None, typer.Option("--from", help="A run folder whose odometry is used again.")] = None,
     out_directory: OutDirectory = None,
     config: options.ConfigFile = None,
     overrides: options.Settings = None,
@@ -42,17 +46,28 @@ def run_command(
 ) -> None:
     """Run SLAM over a sequence and write a run folder."""
     from semslam.datasets import open_dataset
+    from semslam.recording import read_front_end
     from semslam.results import link_latest, new_run_directory
 
-    chosen = options.settings(config, overrides, odometry, detector, seed, loader, start, max_frames, stride)
-    dataset = open_dataset(sequence, config=chosen.dataset)
+    saved = None if saved_run is None else read_front_end(saved_run)
+    recording = None if saved is None else saved.recording
+    if saved_run is not None and config is not None:
+        raise ConfigError("--from takes the saved run's settings; change them with --set, not with --config.")
+    base = config if saved_run is None else saved_run / "config.yaml"
+    chosen = options.settings(base, overrides, odometry, detector, seed, loader, start, max_frames, stride)
+    source = _source(sequence, saved)
+    if saved is not None:
+        saved.check_settings(chosen)
+    dataset = open_dataset(source, config=chosen.dataset)
     directory = out_directory or new_run_directory(RUNS, dataset.name, chosen.detector)
-    metrics = _run_one(dataset, chosen, directory, plots)
+    metrics = _run_one(dataset, chosen, directory, plots, source, recording)
     if out_directory is None:
         link_latest(directory)
     out.print(metrics_table([metrics], f"{dataset.name}: {metrics.frames} frames"))
     out.print(f"Results: {directory}", soft_wrap=True)
-    if metrics.interrupted:
+    if recording is not None and recording.interrupted:
+        remark(f"The saved run was interrupted; its {metrics.frames} frames of {len(dataset)} were used.")
+    elif metrics.interrupted:
         raise KeyboardInterrupt
 
 
@@ -77,7 +92,7 @@ def compare_command(
     chosen = options.settings(config, overrides, odometry, None, seed, loader, start, max_frames, stride)
     dataset = open_dataset(sequence, config=chosen.dataset)
     directory = out_directory or new_run_directory(RUNS, dataset.name, "compare")
-    _compare(dataset, chosen, options.detector_names(detectors), directory, plots)
+    _compare(dataset, chosen, options.detector_names(detectors), directory, plots, sequence)
     if out_directory is None:
         link_latest(directory)
 
@@ -91,7 +106,8 @@ def demo_command(
 
     chosen = options.settings(odometry=DEMO_ODOMETRY, seed=seed)
     dataset = open_dataset(DEMO_SEQUENCE, config=chosen.dataset)
-    alone, closed = _compare(dataset, chosen, options.detector_names(DEMO_DETECTORS), out_directory, plots=True)
+    names = options.detector_names(DEMO_DETECTORS)
+    alone, closed = _compare(dataset, chosen, names, out_directory, plots=True, source=DEMO_SEQUENCE)
     before, after = alone.optimized.ate_rmse_m, closed.optimized.ate_rmse_m
     if before is not None and after is not None:
         out.print(
@@ -101,13 +117,13 @@ def demo_command(
 
 
 def _compare(
-    dataset: "Dataset", config: "Config", detectors: Sequence[str], directory: Path, plots: bool
+    dataset: "Dataset", config: "Config", detectors: Sequence[str], directory: Path, plots: bool, source: str
 ) -> list["Metrics"]:
     from semslam.results import write_json
 
     runs: list[Metrics] = []
     for name in detectors:
-        runs.append(_run_one(dataset, config.with_changes(detector=name), directory / name, plots))
+        runs.append(_run_one(dataset, config.with_changes(detector=name), directory / name, plots, source))
         write_json(directory / "compare.json", [run.model_dump(mode="json") for run in runs])
         if runs[-1].interrupted:
             break
@@ -118,16 +134,35 @@ def _compare(
     return runs
 
 
-def _run_one(dataset: "Dataset", config: "Config", directory: Path, plots: bool) -> "Metrics":
-    from semslam.pipeline import run
+def _source(sequence: str | None, saved: "SavedFrontEnd | None") -> str:
+    """What the dataset is opened by."""
+    if sequence is not None:
+        return sequence
+    if saved is None:
+        raise ConfigError("Name a sequence, or a saved run with --from.")
+    if saved.source is None:
+        raise ConfigError("The saved run does not tell where its images are; name the sequence beside --from.")
+    return saved.source
+
+
+def _run_one(
+    dataset: "Dataset",
+    config: "Config",
+    directory: Path,
+    plots: bool,
+    source: str,
+    recording: "Recording | None" = None,
+) -> "Metrics":
+    from semslam.pipeline import replay, run
     from semslam.results import check_writable, write_run
 
     check_writable(directory)
     with bar(f"{dataset.name} {config.detector}", len(dataset)) as update:
-        result = run(dataset, config, frame_progress(update, len(dataset)))
+        progress = frame_progress(update, len(dataset))
+        result = run(dataset, config, progress) if recording is None else replay(dataset, recording, config, progress)
     remarks(result.notes)
     try:
-        write_run(result, dataset, directory, plots)
+        write_run(result, dataset, directory, plots, source)
     except ResultsError:
         # Hours of tracking must not die with a full disk: show what was found before saying so.
         remark("The run is finished, but could not be saved.")
@@ -145,6 +180,7 @@ COMMANDS = (
             "semslam run rgbd_dataset_freiburg1_room",
             "semslam run DIR --detector none --odometry dense",
             "semslam run DIR --set keyframes.interval=0.5",
+            "semslam run --from runs/latest --detector fused",
         ),
     ),
     Command(
