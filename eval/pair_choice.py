@@ -5,15 +5,15 @@ alike, with the same changes done to them.
 """
 
 from collections import Counter
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import partial
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 
-from eval.changes import LIGHT, Change, change_frame, find_object
+from eval.changes import LIGHT, MIN_OBJECT, Change, change_frame
 from eval.loop_truth import TRUE_OVERLAP, LoopTruth
 from eval.pairs import Pair, PairGroup
 from eval.trajectory import BoolArray
@@ -23,6 +23,20 @@ from semslam.types import Frame
 PAIRS_PER_GROUP = 50
 HISTOGRAM_BINS = (16, 8)
 USES = 2
+# What a change of the world must at least do to a frame: levels of a colour, or metres of depth, on a share of it.
+COLOR_STEP = 12
+DEPTH_STEP = 0.1
+
+Reader = Callable[[int], Frame]
+"""Reads frame 0..N-1 of a choice."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Variant:
+    """The same frames in a changed world: a change in a few words, and what reads them."""
+
+    kind: str
+    read: Reader
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -30,42 +44,44 @@ class PosedFrames:
     """The frames of a sequence that pairs are chosen from.
 
     Attributes:
-        read: reads frame 0..N-1 of the choice.
+        read: reads them unchanged.
         poses: (N, 4, 4) true T_world_cam.
         truth: their loop truth, with all pairs known (``min_gap`` 0).
         min_gap: seconds between the frames of viewpoint pairs and of look-alikes.
+        variants: how the world was changed for a group; the images are changed where nothing stands here.
     """
 
-    read: Callable[[int], Frame]
+    read: Reader
     poses: FloatArray
     truth: LoopTruth
     min_gap: float = 5.0
+    variants: Mapping[PairGroup, Sequence[Variant]] = field(default_factory=dict)
 
 
 def choose_pairs(frames: PosedFrames, count: int = PAIRS_PER_GROUP, seed: int = 0) -> list[Pair]:
     """Up to ``count`` pairs of each group, half of them the same place; deterministic for a seed."""
-    survey = [_survey(frames.read(i)) for i in range(len(frames.poses))]
+    variants = {group: frames.variants.get(group) or _image_variants(frames.read, group, seed) for group in PairGroup}
+    survey = [_survey(frames.read(i), i, variants) for i in range(len(frames.poses))]
     histograms = np.stack([histogram for histogram, _ in survey])
-    has_object = np.array([shown for _, shown in survey])
-    anything = np.ones_like(has_object)
     pairs: list[Pair] = []
-    for group, wanted in (
-        (PairGroup.VIEWPOINT, anything),
-        (PairGroup.ILLUMINATION, anything),
-        (PairGroup.OBJECTS, has_object),
-    ):
-        alike = _look_alikes(frames, histograms, wanted, count // 2)
-        same = _viewpoints if group is PairGroup.VIEWPOINT else _neighbours
-        for same_place, chosen in ((True, same(frames, wanted, len(alike))), (False, alike)):
+    for group in PairGroup:
+        changes = np.array([shown[group] for _, shown in survey])
+        find_same = _viewpoints if group is PairGroup.VIEWPOINT else _neighbours
+        alike = _look_alikes(frames, histograms, changes, count // 2)
+        same = find_same(frames, changes, len(alike))
+        for same_place, chosen in ((True, same), (False, alike[: len(same)])):
             for i, pair in enumerate(chosen):
-                pairs.append(_pair(frames, group, pair, same_place, _change(group, i), seed))
+                pairs.append(_pair(frames, group, variants[group][i % len(variants[group])], pair, same_place))
     return pairs
 
 
-def _change(group: PairGroup, index: int) -> Change:
-    if group is PairGroup.VIEWPOINT:
-        return Change.NONE
-    return Change.REMOVED if group is PairGroup.OBJECTS else LIGHT[index % len(LIGHT)]
+def _image_variants(read: Reader, group: PairGroup, seed: int) -> list[Variant]:
+    changes = {PairGroup.VIEWPOINT: (Change.NONE,), PairGroup.ILLUMINATION: LIGHT, PairGroup.OBJECTS: (Change.REMOVED,)}
+    return [Variant(change.value, partial(_changed, read, change, seed)) for change in changes[group]]
+
+
+def _changed(read: Reader, change: Change, seed: int, index: int) -> Frame:
+    return change_frame(read(index), change, seed * 1_000_003 + index)
 
 
 def _far(frames: PosedFrames) -> BoolArray:
@@ -103,11 +119,24 @@ def _look_alikes(frames: PosedFrames, histograms: FloatArray, wanted: BoolArray,
     return chosen
 
 
-def _survey(frame: Frame) -> tuple[FloatArray, bool]:
-    """Shares (128,) of hues and saturations, and whether an object could be removed."""
+def _survey(
+    frame: Frame, index: int, variants: Mapping[PairGroup, Sequence[Variant]]
+) -> tuple[FloatArray, dict[PairGroup, bool]]:
+    """Shares (128,) of hues and saturations, and for which groups the frame is fit: those whose change it shows."""
     hsv = cv2.cvtColor(np.ascontiguousarray(frame.color), cv2.COLOR_RGB2HSV)
     counts = cv2.calcHist([hsv], [0, 1], None, list(HISTOGRAM_BINS), [0, 180, 0, 256]).ravel()
-    return np.asarray(counts / counts.sum(), dtype=np.float64), bool(find_object(frame.depth).any())
+    shown = {
+        group: group is PairGroup.VIEWPOINT or _differs(frame, variants[group][0].read(index)) for group in PairGroup
+    }
+    return np.asarray(counts / counts.sum(), dtype=np.float64), shown
+
+
+def _differs(before: Frame, after: Frame) -> bool:
+    if after is before:
+        return False
+    colors = cv2.absdiff(before.color, after.color).max(axis=2) > COLOR_STEP
+    depths = (np.abs(before.depth - after.depth) > DEPTH_STEP) & (before.depth > 0)
+    return max(float(colors.mean()), float(depths.mean())) >= MIN_OBJECT
 
 
 def _spread(values: npt.NDArray[np.int64], count: int) -> list[int]:
@@ -116,16 +145,13 @@ def _spread(values: npt.NDArray[np.int64], count: int) -> list[int]:
     return [int(value) for value in values[places]] if len(values) else []
 
 
-def _pair(
-    frames: PosedFrames, group: PairGroup, pair: tuple[int, int], same_place: bool, change: Change, seed: int
-) -> Pair:
+def _pair(frames: PosedFrames, group: PairGroup, variant: Variant, pair: tuple[int, int], same_place: bool) -> Pair:
     poses = frames.poses[list(pair)]
     motion = invert(poses[0]) @ poses[1]
     moved = f"{np.linalg.norm(motion[:3, 3]):.2f} m, {np.degrees(rotation_angle(motion)):.0f}°"
-    kind = moved if change is Change.NONE else change.value
-    return Pair(group, kind, same_place, partial(_load, frames.read, pair, change, seed), poses)
+    kind = moved if group is PairGroup.VIEWPOINT else variant.kind
+    return Pair(group, kind, same_place, partial(_load, (frames.read, variant.read), pair), poses)
 
 
-def _load(read: Callable[[int], Frame], pair: tuple[int, int], change: Change, seed: int, side: int) -> Frame:
-    frame = read(pair[side])
-    return change_frame(frame, change, seed * 1_000_003 + pair[1]) if side else frame
+def _load(readers: tuple[Reader, Reader], pair: tuple[int, int], side: int) -> Frame:
+    return readers[side](pair[side])

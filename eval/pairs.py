@@ -47,6 +47,20 @@ class Pair:
     poses: FloatArray
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class ScoredPairs:
+    """The pairs of one sequence or folder, and each detector's scores (M,) of them."""
+
+    name: str
+    pairs: Sequence[Pair]
+    scores: Mapping[str, FloatArray]
+
+    @property
+    def same_place(self) -> BoolArray:
+        """Truth (M,)."""
+        return np.array([pair.same_place for pair in self.pairs], dtype=bool)
+
+
 @dataclass(frozen=True, slots=True)
 class GroupAccuracy:
     """Share of a group's pairs that were told rightly, and their number."""
@@ -103,30 +117,37 @@ def best_threshold(scores: FloatArray, same_place: BoolArray) -> float:
     return float(cuts[np.argmax(hits - alarms)])
 
 
-def judge_pairs(scores: Mapping[str, Sequence[FloatArray]], pairs: Sequence[Sequence[Pair]]) -> list[PairQuality]:
-    """Accuracy in each group, each sequence judged at the threshold that is best on all the others.
+def find_thresholds(tested: Sequence[ScoredPairs], tuning: Sequence[ScoredPairs] = ()) -> dict[str, list[float]]:
+    """Each detector's threshold for each tested set, never chosen on that set.
 
     Args:
-        scores: for each detector the scores of each sequence's pairs.
-        pairs: each sequence's pairs.
+        tested: what will be judged.
+        tuning: other sets that the threshold comes from; without them it comes from all the other tested sets.
 
     Raises:
-        ConfigError: fewer than two sequences hold pairs, so that no other could give the threshold.
+        ConfigError: there is no other set with pairs.
     """
-    if sum(bool(some) for some in pairs) < 2:
+    filled = [some for some in tuning or tested if some.pairs]
+    if not filled or (not tuning and len(filled) < 2):
         raise ConfigError("The threshold comes from other sequences: give at least two that hold pairs.")
-    return [PairQuality(name, _accuracy(per_sequence, pairs)) for name, per_sequence in scores.items()]
+    thresholds: dict[str, list[float]] = {name: [] for name in tested[0].scores}
+    for some in tested:
+        others = [other for other in filled if other is not some]
+        same = np.concatenate([other.same_place for other in others])
+        for name, found in thresholds.items():
+            found.append(best_threshold(np.concatenate([other.scores[name] for other in others]), same))
+    return thresholds
 
 
-def _accuracy(scores: Sequence[FloatArray], pairs: Sequence[Sequence[Pair]]) -> dict[str, GroupAccuracy]:
-    truth = [np.array([pair.same_place for pair in some], dtype=bool) for some in pairs]
+def judge_pairs(tested: Sequence[ScoredPairs], thresholds: Mapping[str, Sequence[float]]) -> list[PairQuality]:
+    """Accuracy of each detector in each group over all sets, each at its own threshold."""
+    return [PairQuality(name, _accuracy(name, tested, cuts)) for name, cuts in thresholds.items()]
+
+
+def _accuracy(name: str, tested: Sequence[ScoredPairs], thresholds: Sequence[float]) -> dict[str, GroupAccuracy]:
     right: dict[PairGroup, list[bool]] = {group: [] for group in PairGroup}
-    for at in range(len(pairs)):
-        others = [i for i in range(len(pairs)) if i != at]
-        threshold = best_threshold(
-            np.concatenate([scores[i] for i in others]), np.concatenate([truth[i] for i in others])
-        )
-        for pair, score in zip(pairs[at], scores[at], strict=True):
+    for some, threshold in zip(tested, thresholds, strict=True):
+        for pair, score in zip(some.pairs, some.scores[name], strict=True):
             right[pair.group].append(bool((score >= threshold) == pair.same_place))
     return {group.value: GroupAccuracy(float(np.mean(hits)), len(hits)) for group, hits in right.items() if hits}
 

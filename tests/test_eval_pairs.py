@@ -1,5 +1,6 @@
 """Pairs: their choice, their scores, thresholds from elsewhere, folders with a CSV, the sheet."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -9,10 +10,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from eval.loop_truth import find_loop_truth, make_view
-from eval.pair_choice import PosedFrames, choose_pairs
+from eval.pair_choice import PosedFrames, Variant, choose_pairs
 from eval.pair_folder import read_pair_folder
 from eval.pair_sheet import draw_sheet
-from eval.pairs import Pair, PairGroup, best_threshold, judge_pairs, score_pairs
+from eval.pair_table import pair_rows, told_by_kind
+from eval.pairs import Pair, PairGroup, ScoredPairs, best_threshold, find_thresholds, judge_pairs, score_pairs
 from semslam.camera import Intrinsics
 from semslam.errors import ConfigError, DatasetError
 from semslam.geometry import FloatArray, make_transform
@@ -89,19 +91,59 @@ def test_groups_are_balanced_true_and_repeatable() -> None:
         assert np.array_equal(a.load(1).color, b.load(1).color)
 
 
+def scored(name: str, count: int = 8) -> ScoredPairs:
+    pairs = choose_pairs(posed_frames(), count=count)
+    return ScoredPairs(
+        name, pairs, score_pairs({"oracle": Oracle(), "blind": Blind()}, pairs, make_keyframe_view)
+    )  # fmt: skip
+
+
 def test_an_oracle_is_right_and_a_blind_detector_half_right() -> None:
-    pairs = choose_pairs(posed_frames(), count=8)
-    scores = score_pairs({"oracle": Oracle(), "blind": Blind()}, pairs, make_keyframe_view)
-    oracle, blind = judge_pairs({name: [s, s] for name, s in scores.items()}, [pairs, pairs])
+    sets = [scored("a"), scored("b")]
+    thresholds = find_thresholds(sets)
+    oracle, blind = judge_pairs(sets, thresholds)
     assert {group.accuracy for group in oracle.groups.values()} == {1.0}
     assert {group.accuracy for group in blind.groups.values()} == {0.5}
     assert oracle.groups["objects"].pairs == 16
+    kinds = {row.kind: row for row in told_by_kind(sets, thresholds)}
+    assert kinds["gamma 2.5"].told == {"oracle": 1.0, "blind": 0.0}
+    assert kinds["look-alikes, objects"].told == {"oracle": 1.0, "blind": 1.0}
+    assert sum(row.pairs for row in kinds.values()) == 48
+    rows = pair_rows(sets, thresholds).splitlines()
+    assert len(rows) == 1 + 2 * 48
+    assert rows[1].startswith("a,0,viewpoint,")
 
 
-def test_one_sequence_has_no_threshold() -> None:
-    pairs = choose_pairs(posed_frames(), count=2)
+def test_a_threshold_never_comes_from_the_set_that_is_judged() -> None:
+    pairs = choose_pairs(posed_frames(), count=4)
+    same = np.array([pair.same_place for pair in pairs])
+    a, b, c = (
+        ScoredPairs(name, pairs, {"x": np.where(same, high, 0.0)})
+        for name, high in (("a", 0.2), ("b", 0.6), ("c", 1.0))
+    )
+    assert find_thresholds([a, b])["x"] == pytest.approx([0.3, 0.1])
+    assert find_thresholds([a], [c])["x"] == pytest.approx([0.5])
     with pytest.raises(ConfigError, match="at least two"):
-        judge_pairs({"blind": [np.zeros(len(pairs))]}, [pairs])
+        find_thresholds([a])
+
+
+def test_a_world_that_changes_is_used_where_it_is_given() -> None:
+    frames = posed_frames()
+
+    def moved(index: int) -> Frame:
+        frame = frames.read(index)
+        return replace(frame, depth=np.full_like(frame.depth, 2.0)) if index >= 20 else frame
+
+    worlds = {PairGroup.OBJECTS: [Variant("box gone", moved)]}
+    pairs = [
+        pair for pair in choose_pairs(replace(frames, variants=worlds), count=8) if pair.group is PairGroup.OBJECTS
+    ]  # fmt: skip
+    assert pairs
+    for pair in pairs:
+        assert pair.kind == "box gone"
+        assert pair.load(0).depth.min() == pytest.approx(1.2)
+        assert pair.load(1).index >= 20
+        assert pair.load(1).depth.min() == pytest.approx(2.0)
 
 
 @given(st.lists(st.tuples(st.integers(0, 6), st.booleans()), min_size=1, max_size=30))
