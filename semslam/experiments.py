@@ -8,6 +8,7 @@ import numpy as np
 from eval.loop_truth import DepthView, find_loop_truth, make_view
 from eval.precision_recall import Contestant, Curve, DetectorQuality, collect_scores, curve_of, judge_detector
 from frontend.keyframes import make_keyframe
+from loop.detector import LoopDetector
 from loop.segmentation.build import build_segmenter
 from semslam import plugins
 from semslam.config import Config
@@ -97,11 +98,21 @@ def keyframe_views(
         yield KeyframeView(keyframe, frame.color, frame.depth, labels)
 
 
-def _contestant(name: str, config: Config, keyframes: int) -> Contestant:
+def exhaustive_detector(name: str, config: Config, keyframes: int) -> LoopDetector:
+    """The detector ``name``, set to name every pair of so many keyframes that it scores above 0.
+
+    Raises:
+        ConfigError: the name is unknown, or is "none", which scores nothing.
+    """
     if name == "none":
         raise ConfigError("The detector 'none' proposes nothing that could be scored.")
-    detector = plugins.load("semslam.detectors", name)
-    everything = config.loops.model_copy(update={"max_candidates": keyframes, "min_score": 0.0})
+    everything = config.loops.model_copy(update={"max_candidates": max(keyframes, 1), "min_score": 0.0})
+    detector: LoopDetector = plugins.load("semslam.detectors", name).from_config(config.with_changes(loops=everything))
+    return detector
+
+
+def _contestant(name: str, config: Config, keyframes: int) -> Contestant:
     return Contestant(
-        exhaustive=detector.from_config(config.with_changes(loops=everything)), ordinary=detector.from_config(config)
+        exhaustive=exhaustive_detector(name, config, keyframes),
+        ordinary=plugins.load("semslam.detectors", name).from_config(config),
     )

@@ -1,9 +1,9 @@
-"""semslam eval."""
+"""semslam eval, loops, pairs."""
 
 import json
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.table import Table
@@ -11,6 +11,12 @@ from rich.table import Table
 from semslam.cli import options
 from semslam.cli.command import Command, example
 from semslam.cli.console import bar, out, remarks
+from semslam.errors import ConfigError
+
+if TYPE_CHECKING:
+    from semslam.pair_trial import PairTrial
+
+GROUPS = ("viewpoint", "illumination", "objects")
 
 
 def eval_command(
@@ -79,6 +85,77 @@ def loops_command(
     out.print(f"{q.true_pairs} true and {q.false_pairs} false pairs; results: {out_directory}", soft_wrap=True)
 
 
+def pairs_command(
+    sequences: Annotated[list[str] | None, typer.Argument(help="Sequences with ground truth.")] = None,
+    folder: Annotated[
+        list[Path] | None, typer.Option("--folder", help="Folder with pairs.csv and camera.yaml; may be repeated.")
+    ] = None,
+    threshold_from: Annotated[
+        list[str] | None, typer.Option("--threshold-from", help="Sequence that thresholds come from; may be repeated.")
+    ] = None,
+    detectors: Annotated[
+        str, typer.Option("--detectors", help="Names joined by commas.")
+    ] = "semantic-paper,semantic,fused,dbow,cnnw",
+    every: Annotated[int, typer.Option(min=1, help="Frames from one that may be chosen to the next.")] = 5,
+    count: Annotated[int, typer.Option(min=2, help="Pairs of each group and sequence at the most.")] = 50,
+    out_directory: Annotated[Path, typer.Option("--out", help="Folder for the results.")] = Path("pairs"),
+    config: options.ConfigFile = None,
+    overrides: options.Settings = None,
+    seed: options.Seed = None,
+) -> None:
+    """Tell the same place from look-alikes under changes of viewpoint, light and objects."""
+    from semslam.pair_trial import PairPlan, try_pairs
+    from semslam.results import writing
+
+    chosen = options.settings(config, overrides, seed=seed)
+    names = options.detector_names(detectors)
+    given = tuple(sequences or ())
+    if len(set(given)) != len(given):
+        raise ConfigError("Name each sequence only once.")
+    plan = PairPlan(given, tuple(folder or ()), tuple(threshold_from or ()), every, count)
+    with writing(out_directory):
+        out_directory.mkdir(parents=True, exist_ok=True)
+    with bar("pairs", None) as update:
+        trial = try_pairs(plan, chosen, names, lambda _set, done, whole: update(done, whole))
+    _write_pairs(trial, out_directory)
+    _print_pairs(trial)
+    source = ", ".join(plan.tuning_sequences) or "the other sets given"
+    out.print(f"Thresholds from {source}; results: {out_directory}", soft_wrap=True)
+
+
+def _write_pairs(trial: "PairTrial", directory: Path) -> None:
+    """Write pairs.json, a row for each pair and detector (pairs.csv), and a sheet of examples for each set."""
+    from eval.pair_sheet import draw_sheet
+    from eval.pair_table import pair_rows
+    from semslam.results import write_json, writing
+
+    write_json(directory / "pairs.json", {"detectors": [asdict(quality) for quality in trial.qualities]})
+    with writing(directory):
+        (directory / "pairs.csv").write_text(pair_rows(trial.tested, trial.thresholds), encoding="utf-8")
+        for number, some in enumerate(trial.tested, start=1):
+            (directory / f"pairs-{number}.png").write_bytes(draw_sheet(some.pairs, some.name))
+
+
+def _print_pairs(trial: "PairTrial") -> None:
+    from eval.pair_table import told_by_kind
+
+    sizes = ", ".join(f"{some.name} ({len(some.pairs)})" for some in trial.tested)
+    table = Table(title=f"Share of pairs told rightly: {sizes}", title_justify="left")
+    for heading in ("detector", *GROUPS):
+        table.add_column(heading, justify="left" if heading == "detector" else "right")
+    for quality in trial.qualities:
+        cells = [quality.groups.get(group) for group in GROUPS]
+        table.add_row(quality.detector, *("-" if cell is None else f"{cell.accuracy:.3f}" for cell in cells))
+    out.print(table)
+    names = [quality.detector for quality in trial.qualities]
+    table = Table(title="The same, by what was changed (pairs)", title_justify="left")
+    for heading in ("change", "pairs", *names):
+        table.add_column(heading, justify="left" if heading == "change" else "right")
+    for kind in told_by_kind(trial.tested, trial.thresholds):
+        table.add_row(kind.kind, str(kind.pairs), *(f"{kind.told[name]:.3f}" for name in names))
+    out.print(table)
+
+
 COMMANDS = (
     Command(
         "eval",
@@ -91,5 +168,11 @@ COMMANDS = (
         loops_command,
         "Score loop detectors on a sequence: precision-recall curves against view overlap (the paper's Figure 13).",
         example("semslam loops SEQ --detectors semantic,dbow,conv3"),
+    ),
+    Command(
+        "pairs",
+        pairs_command,
+        "Tell the same place from look-alikes under changes of viewpoint, light and objects (the paper's Table 2).",
+        example("semslam pairs SEQ1 SEQ2 --detectors semantic,fused", "semslam pairs --folder MY_PAIRS"),
     ),
 )
