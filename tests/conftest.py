@@ -1,6 +1,7 @@
 """Fixtures that many tests use."""
 
 import os
+import tomllib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -87,6 +88,24 @@ def _poster(height: int, width: int) -> np.ndarray:
 def wall() -> WallDataset:
     """A short sequence with exact poses."""
     return WallDataset()
+
+
+EXAMPLE_PLUGIN = Path(__file__).resolve().parents[1] / "examples" / "plugin"
+
+
+@pytest.fixture
+def example_plugin(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    """The name of the example's detector, which can be found as if the example were installed."""
+    project = tomllib.loads((EXAMPLE_PLUGIN / "pyproject.toml").read_text())["project"]
+    points = project["entry-points"]["semslam.detectors"]
+    info = tmp_path / f"{project['name'].replace('-', '_')}-{project['version']}.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {project['name']}\nVersion: {project['version']}\n")
+    listed = "\n".join(f"{name} = {target}" for name, target in points.items())
+    (info / "entry_points.txt").write_text(f"[semslam.detectors]\n{listed}\n")
+    for folder in (tmp_path, EXAMPLE_PLUGIN):
+        monkeypatch.syspath_prepend(str(folder))
+    return next(iter(points))
 
 
 @dataclass(frozen=True)

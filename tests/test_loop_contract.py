@@ -40,9 +40,9 @@ def view(identity: int, place: int, timestamp: float | None = None) -> KeyframeV
     return KeyframeView(keyframe, color, depth, LabelMap(labels, NAMES))
 
 
-@pytest.fixture(params=plugins.names("semslam.detectors"))
+@pytest.fixture(params=[*plugins.names("semslam.detectors"), "example_plugin"])
 def name(request: pytest.FixtureRequest) -> str:
-    return str(request.param)
+    return str(request.getfixturevalue(request.param) if request.param == "example_plugin" else request.param)
 
 
 def make(name: str, config: Config = CONFIG) -> Any:
@@ -120,3 +120,12 @@ def test_a_blank_view_is_no_error(name: str) -> None:
     assert all(np.isfinite(candidate.score) for candidate in detector.query(dark))
     detector.add(dark)
     assert isinstance(detector.query(view(70, 2)), list)
+
+
+def test_the_example_takes_its_settings(example_plugin: str) -> None:
+    assert example_plugin in plugins.names("semslam.detectors")
+    coarse = make(example_plugin, CONFIG.with_changes(plugins={example_plugin: {"bins": 2}}))
+    fine = make(example_plugin)
+    for detector in (coarse, fine):
+        detector.add(view(0, 0))
+    assert coarse.query(view(9, 1))[0].score > fine.query(view(9, 1))[0].score
