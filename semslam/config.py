@@ -84,6 +84,8 @@ class FeatureOdometryConfig(Section):
 class FeatureMapConfig(Section):
     """Odometry against a map of landmarks."""
 
+    levels: int = Field(4, gt=0, description="pyramid levels, in place of features.levels")
+    scale: float = Field(1.44, gt=1, description="scale between levels, in place of features.scale")
     min_inliers: int = Field(15, gt=5, description="landmarks that must agree on a pose")
     sure_inliers: int = Field(40, gt=5, description="landmarks below which a pose is called degraded")
     min_landmarks: int = Field(50, gt=5, description="keypoints with depth that a keyframe must have")
@@ -163,8 +165,10 @@ class TrainingConfig(Section):
     average: float = Field(0.998, ge=0, lt=1, description="decay of the weight average that is kept")
     strong_share: float = Field(0.0, ge=0, le=1, description="share of views taken close, rolled, blurred, badly lit")
     rare_share: float = Field(0.0, ge=0, le=1, description="share of views drawn by class, every class as often")
-    pseudo: tuple[Path, ...] = Field((), description="more folders of photos whose labels a teacher made")
-    pseudo_share: float = Field(0.4, ge=0, lt=1, description="share of views drawn from those")
+    unlabelled: Path | None = Field(None, description="folder of photos without labels, for teachers to label")
+    teachers: tuple[Path, ...] = Field((), description="weights of the networks that label them together")
+    teacher_confidence: float = Field(0.4, ge=0, le=1, description="below it a teachers' label becomes void")
+    unlabelled_share: float = Field(0.4, ge=0, lt=1, description="share of views drawn from those photos")
     threads: int = Field(1, gt=0, description="training threads")
     save_every: float = Field(60.0, gt=0, description="seconds between checkpoints")
 
@@ -323,6 +327,9 @@ class BackendConfig(Section):
     max_iterations: int = Field(100, gt=0, description="Levenberg-Marquardt steps at the most")
     max_odometry_scale: float = Field(
         10.0, ge=1, description="how far odometry's deviations may be widened where most loops contradict them"
+    )
+    contribution_limit: int = Field(
+        100_000, ge=0, description="keyframes times accepted loops up to which each loop is left out once; 0 = never"
     )
     max_loop_scale: float = Field(
         3.0, ge=1, description="how far the loops' deviations may be widened where neighbouring ones disagree"

@@ -15,7 +15,7 @@ from loop.segmentation.self_training import Teacher, label_folder
 from loop.segmentation.training import class_weights, learning_rate, photos_by_class, train
 from loop.segmentation.training_log import read_log
 from semslam.config import load_config
-from semslam.errors import DatasetError, ModelError
+from semslam.errors import ConfigError, DatasetError, ModelError
 
 SIZE = {"width": 64, "height": 48}
 
@@ -100,7 +100,14 @@ def test_teacher_labels_train_on(rooms, tmp_path):
     photos = read_photos(tmp_path / "pseudo", "train.txt")
     assert len(photos) == 6
     assert all((photo.labels == teacher.label(photo.color, 0.2)).all() for photo in photos)
-    assert train(rooms, settings(epochs=1, pseudo=[str(tmp_path / "pseudo")]), tmp_path / "run").exists()
+
+
+def test_training_lets_teachers_label_first(rooms, tmp_path):
+    taught = settings(epochs=1, unlabelled=str(rooms / "rgb"), teachers=[str(SHIPPED)], teacher_confidence=0.2)
+    assert train(rooms, taught, tmp_path / "run").exists()
+    assert len(read_photos(tmp_path / "run" / "taught", "train.txt")) == 6
+    with pytest.raises(ConfigError, match="needs both"):
+        train(rooms, settings(unlabelled=str(rooms / "rgb")), tmp_path / "other")
 
 
 @pytest.mark.parametrize(

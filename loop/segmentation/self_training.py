@@ -64,7 +64,7 @@ def label_folder(
     min_confidence: float = 0.5,
     report: Callable[[int, int], None] = lambda _done, _total: None,
 ) -> None:
-    """Write a folder in the NYUv2 layout from unlabelled photos, for the setting ``training.pseudo``.
+    """Write a folder in the NYUv2 layout from unlabelled photos.
 
     Raises:
         DatasetError: ``photos`` holds no JPEG or PNG image.

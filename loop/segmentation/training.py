@@ -18,11 +18,13 @@ from loop.segmentation.classes import CLASS_COUNT
 from loop.segmentation.decoding import input_size, shrink
 from loop.segmentation.export import write_int8
 from loop.segmentation.network import DeepLab, build_mobilenet_deeplab
+from loop.segmentation.onnx import load_graph
 from loop.segmentation.photos import Photo, read_photos
 from loop.segmentation.pretrained import convert_ade20k, refresh_norms
+from loop.segmentation.self_training import Teacher, label_folder
 from loop.segmentation.training_log import plot_log, write_row
 from semslam.config import Config, TrainingConfig
-from semslam.errors import ModelError
+from semslam.errors import ConfigError, ModelError
 
 LOSS_STRIDE = 4
 LOG_STEPS = 20
@@ -82,6 +84,24 @@ def class_weights(photos: list[Photo]) -> Tensor:
     return torch.tensor(np.clip(weights, *WEIGHT_LIMITS), dtype=torch.float32)
 
 
+def taught_photos(settings: TrainingConfig, folder: Path) -> list[Photo]:
+    """The unlabelled photos with the teachers' labels, made once and kept in ``folder``; none without teachers.
+
+    Raises:
+        ConfigError: there are photos without teachers, or teachers without photos.
+        DatasetError: the folder of unlabelled photos holds none.
+        ModelError: a teacher's weights are missing or damaged.
+    """
+    if (settings.unlabelled is None) != (not settings.teachers):
+        raise ConfigError("Self-training needs both 'training.unlabelled' and 'training.teachers'.")
+    if settings.unlabelled is None:
+        return []
+    if not (folder / "train.txt").exists():
+        teacher = Teacher([load_graph(path, "float32") for path in settings.teachers], threads=settings.threads)
+        label_folder(teacher, settings.unlabelled, folder, settings.teacher_confidence)
+    return read_photos(folder, "train.txt")
+
+
 def photos_by_class(photos: list[Photo]) -> list[list[Photo]]:
     """For each class that occurs, the photos of which it covers at least a hundredth."""
     shares = np.stack([np.bincount(p.labels.ravel(), minlength=CLASS_COUNT + 1)[1:] / p.labels.size for p in photos])
@@ -106,7 +126,7 @@ class _Run:
         self.size = input_size(config.segmentation)
         self.photos = read_photos(directory, "train.txt")
         self.by_class = photos_by_class(self.photos)
-        self.pseudo = [p for folder in settings.pseudo for p in read_photos(folder, "train.txt")]
+        self.taught = taught_photos(settings, out / "taught")
         self.steps = max(1, settings.epochs * len(self.photos) // settings.batch)
         self.step = 0
         self.weights = class_weights(self.photos)
@@ -142,7 +162,7 @@ class _Run:
         return images, torch.from_numpy(np.stack(labels).astype(np.int64)) - 1
 
     def _draw(self, rng: np.random.Generator) -> Photo:
-        pool = self.pseudo if self.pseudo and rng.random() < self.settings.pseudo_share else self.photos
+        pool = self.taught if self.taught and rng.random() < self.settings.unlabelled_share else self.photos
         if pool is self.photos and rng.random() < self.settings.rare_share:
             pool = self.by_class[int(rng.integers(len(self.by_class)))]
         return pool[int(rng.integers(len(pool)))]
