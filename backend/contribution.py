@@ -23,12 +23,14 @@ class Contribution:
             with them, large where it pulls against them.
         shift_m: root mean square movement of the keyframes without it; a loop that others back up moves little.
         poses: (4, 4) T_world_cam by key without it, so that an error can be taken against ground truth.
+        poses_with: the same with it.
     """
 
     constraint: LoopConstraint
     tension: float
     shift_m: float
     poses: dict[int, FloatArray]
+    poses_with: dict[int, FloatArray]
 
 
 def leave_one_out(solution: GraphSolution, config: BackendConfig) -> Iterator[Contribution]:
@@ -40,13 +42,14 @@ def leave_one_out(solution: GraphSolution, config: BackendConfig) -> Iterator[Co
     accepted = [verdict.constraint for verdict in solution.verdicts if verdict.accepted]
     factors = _factors(solution, len(accepted))
     offset = len(factors) - len(accepted)
-    values = make_values(solution.poses)
-    whole = 2.0 * _graph(factors).error(least_squares(_graph(factors), values, config.max_iterations))
+    values = least_squares(_graph(factors), make_values(solution.poses), config.max_iterations)
+    whole, poses_with = 2.0 * _graph(factors).error(values), read_poses(values, solution.poses)
     for index, constraint in enumerate(accepted):
         rest = _graph([*factors[: offset + index], *factors[offset + index + 1 :]])
         without = least_squares(rest, values, config.max_iterations)
         poses = read_poses(without, solution.poses)
-        yield Contribution(constraint, whole - 2.0 * rest.error(without), _shift(poses, solution.poses), poses)
+        tension = whole - 2.0 * rest.error(without)
+        yield Contribution(constraint, tension, _shift(poses, poses_with), poses, poses_with)
 
 
 def _factors(solution: GraphSolution, accepted: int) -> list[gtsam.NonlinearFactor]:

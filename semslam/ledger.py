@@ -20,6 +20,23 @@ class Verdict(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
+class LoopContribution:
+    """What an accepted loop brought, by the pose graph without it.
+
+    Attributes:
+        tension: squared Mahalanobis distance that the other measurements gain when it goes; about 6 where it agrees
+            with them as stated, large where it pulls against them.
+        shift_m: root mean square movement of the keyframes without it, metres.
+        ate_gain_m: by how much the keyframes' ATE grows without it, metres, where there is ground truth; negative
+            for a loop that did harm.
+    """
+
+    tension: float
+    shift_m: float
+    ate_gain_m: float | None
+
+
+@dataclass(frozen=True, slots=True)
 class LedgerEntry:
     """All that is known of one loop candidate.
 
@@ -45,6 +62,7 @@ class LedgerEntry:
         T_match_query: rows of the (4, 4) relative pose, or None.
         weight: the back end's weight, 0..1, or None.
         truth: the judgement and pose error, where the loop was verified and ground truth covers both frames.
+        contribution: what the loop brought, where it was accepted and that was worked out.
     """
 
     query: int
@@ -68,6 +86,7 @@ class LedgerEntry:
     T_match_query: list[list[float]] | None = None
     weight: float | None = None
     truth: JudgedLoop | None = None
+    contribution: LoopContribution | None = None
 
     def to_json(self) -> str:
         """One line of JSON."""
@@ -96,6 +115,8 @@ class LedgerEntry:
             values["truth"] = truth and JudgedLoop(
                 LoopJudgement(truth["judgement"]), truth["translation_m"], truth["rotation_deg"]
             )
+            contribution = values.get("contribution")
+            values["contribution"] = contribution and LoopContribution(**contribution)
             return cls(**values)
         except (KeyError, TypeError, ValueError) as error:
             raise ResultsError(f"This is not a line of a loop ledger: {line[:80]!r}.") from error
@@ -103,10 +124,11 @@ class LedgerEntry:
 
 @dataclass(frozen=True, slots=True)
 class GraphVerdict:
-    """What the graph said of a verified loop."""
+    """What the graph said of a verified loop, and what the loop brought where that was worked out."""
 
     weight: float
     accepted: bool
+    contribution: LoopContribution | None = None
 
 
 def rejected_entry(rejection: LoopRejection, keyframes: Sequence[Keyframe]) -> LedgerEntry:
@@ -137,6 +159,7 @@ def verified_entry(
         T_match_query=pose.tolist(),
         weight=graph.weight,
         truth=truth,
+        contribution=graph.contribution,
     )
 
 

@@ -108,6 +108,9 @@ def _report_loop(entry: LedgerEntry, start: float, images: tuple[UInt8Array, UIn
     figures = [(name, float(getattr(entry, name))) for name in FIGURES if getattr(entry, name) is not None]
     if entry.truth is not None:
         figures += [("error_m", entry.truth.translation_m), ("error_deg", entry.truth.rotation_deg)]
+    if entry.contribution is not None:
+        figures += [("tension", entry.contribution.tension), ("shift_m", entry.contribution.shift_m)]
+        figures += [("ate_gain_m", gain) for gain in (entry.contribution.ate_gain_m,) if gain is not None]
     reason = entry.reason or ""
     if entry.figure is not None:
         reason = f"{reason}: {entry.figure:.3g}, limit {entry.limit:.3g}"

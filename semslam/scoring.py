@@ -9,6 +9,7 @@ import numpy as np
 from eval.loop_truth import JudgedLoop, LoopJudgement, judge_loops
 from eval.trajectory import TrajectoryScore, coverage, score_trajectory
 from semslam.config import Config
+from semslam.contributions import loop_contributions
 from semslam.datasets.dataset import Dataset
 from semslam.errors import TrajectoryError
 from semslam.ledger import GraphVerdict, LedgerEntry, Verdict, rejected_entry, verified_entry
@@ -40,7 +41,7 @@ def score_run(
     """Score a run; without ground truth, or where it meets fewer than three poses, the errors are None."""
     truth = dataset.ground_truth
     odometry, trajectory = _trajectories(slam)
-    ledger = _ledger(dataset, slam)
+    ledger = _ledger(dataset, slam, config)
     stamps = [state.timestamp for state in slam.frames]
     metrics = Metrics(
         sequence=dataset.name,
@@ -100,13 +101,14 @@ def _score(estimate: Trajectory, truth: Trajectory | None) -> TrajectoryScore | 
         return None
 
 
-def _ledger(dataset: Dataset, slam: SlamResult) -> tuple[LedgerEntry, ...]:
-    verdicts = iter(zip(slam.solution.verdicts, _truths(dataset, slam), strict=True))
+def _ledger(dataset: Dataset, slam: SlamResult, config: Config) -> tuple[LedgerEntry, ...]:
+    contributions = loop_contributions(slam.solution, slam.keyframes, dataset.ground_truth, config.backend)
+    verdicts = iter(zip(slam.solution.verdicts, _truths(dataset, slam), contributions, strict=True))
     entries = []
     for outcome in slam.outcomes:
         if isinstance(outcome, LoopConstraint):
-            verdict, truth = next(verdicts)
-            graph = GraphVerdict(verdict.weight, verdict.accepted)
+            verdict, truth, contribution = next(verdicts)
+            graph = GraphVerdict(verdict.weight, verdict.accepted, contribution)
             entries.append(verified_entry(outcome, slam.keyframes, graph, truth))
         else:
             entries.append(rejected_entry(outcome, slam.keyframes))

@@ -14,7 +14,7 @@ from semslam.cli.console import out, remark
 from semslam.errors import ConfigError
 
 if TYPE_CHECKING:
-    from semslam.ledger import LedgerEntry
+    from semslam.ledger import LedgerEntry, LoopContribution
 
 RunFolder = Annotated[Path, typer.Argument(help="A run folder.")]
 
@@ -101,7 +101,8 @@ def stress_command(
 
 def _ledger_table(entries: "list[LedgerEntry]") -> Table:
     table = Table()
-    for heading in ("query", "match", "seconds", "score", "verdict", "reason", "inliers", "fitness", "weight", "truth"):
+    headings = ("query", "match", "seconds", "score", "verdict", "reason", "inliers", "fitness", "weight", "truth")
+    for heading in (*headings, "tension", "without it"):
         table.add_column(heading, justify="left" if heading in ("verdict", "reason", "truth") else "right")
     for e in entries:
         reason = "" if e.reason is None else e.reason
@@ -119,8 +120,17 @@ def _ledger_table(entries: "list[LedgerEntry]") -> Table:
             "" if e.fitness is None else f"{e.fitness:.2f}",
             "" if e.weight is None else f"{e.weight:.2f}",
             error,
+            "" if e.contribution is None else f"{e.contribution.tension:.1f}",
+            "" if e.contribution is None else _without(e.contribution),
         )
     return table
+
+
+def _without(contribution: "LoopContribution") -> str:
+    """What a loop's absence would do to the error, or else to the keyframes."""
+    if contribution.ate_gain_m is None:
+        return f"moved {100 * contribution.shift_m:.2f} cm"
+    return f"ATE {100 * contribution.ate_gain_m:+.2f} cm"
 
 
 COMMANDS = (
