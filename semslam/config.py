@@ -331,9 +331,6 @@ class BackendConfig(Section):
     contribution_limit: int = Field(
         100_000, ge=0, description="keyframes times accepted loops up to which each loop is left out once; 0 = never"
     )
-    contribution_limit: int = Field(
-        100_000, ge=0, description="keyframes times accepted loops up to which each loop is left out once; 0 = never"
-    )
     max_loop_scale: float = Field(
         3.0, ge=1, description="how far the loops' deviations may be widened where neighbouring ones disagree"
     )
