@@ -16,11 +16,12 @@ import numpy as np
 
 from loop import autoencoder, cnnw, fusion, sda, vocabulary
 from loop.backbone import Backbone
-from loop.dbow import Bag, make_bag
+from loop.dbow import make_bag
 from loop.fusion_training import Looks, train_fusion
 from loop.photo_views import make_view, overlap
 from loop.segmentation.classes import MOVABLE, NYU40_NAMES
 from loop.segmentation.onnx import OnnxSegmenter
+from loop.word_index import Bag
 from semslam.camera import Intrinsics
 from semslam.config import Config
 from semslam.features import FeatureExtractor

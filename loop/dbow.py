@@ -4,44 +4,12 @@ from typing import Self
 
 import numpy as np
 
-from loop.growing import GrowingArray
 from loop.memo import LastView
 from loop.timeline import Timeline
 from loop.vocabulary import Vocabulary, load_vocabulary
+from loop.word_index import Bag, WordIndex
 from semslam.config import Config, DbowConfig, LoopConfig
-from semslam.types import Float32Array, FloatArray, IntArray, KeyframeView, LoopCandidate, LoopEvidence, UInt8Array
-
-Bag = tuple[IntArray, Float32Array]
-"""Words of an image, ascending, and their tf-idf weights, which add up to one."""
-
-
-class WordIndex:
-    """The inverted file: for each word the images that hold it, and with which weight."""
-
-    def __init__(self) -> None:
-        self._images: dict[int, GrowingArray[np.int64]] = {}
-        self._weights: dict[int, GrowingArray[np.float32]] = {}
-        self._count = 0
-
-    def add(self, bag: Bag) -> None:
-        """Enter the next image."""
-        for word, weight in zip(bag[0].tolist(), bag[1], strict=True):
-            if word not in self._images:
-                self._images[word], self._weights[word] = GrowingArray(np.int64), GrowingArray(np.float32)
-            self._images[word].append([self._count])
-            self._weights[word].append([weight])
-        self._count += 1
-
-    def scores(self, bag: Bag) -> FloatArray:
-        """L1 score (N,) in 0..1 with each image: 1 - |v - w| / 2, which is the sum of the smaller weights."""
-        shared = [(word, weight) for word, weight in zip(bag[0].tolist(), bag[1], strict=True) if word in self._images]
-        if not shared:
-            return np.zeros(self._count)
-        images = np.concatenate([self._images[word].rows for word, _ in shared])
-        theirs = np.concatenate([self._weights[word].rows for word, _ in shared])
-        ours = np.repeat([weight for _, weight in shared], [len(self._images[word]) for word, _ in shared])
-        smaller = np.minimum(ours, theirs).astype(np.float64)
-        return np.asarray(np.bincount(images, smaller, self._count), dtype=np.float64)
+from semslam.types import FloatArray, KeyframeView, LoopCandidate, LoopEvidence, UInt8Array
 
 
 class DbowDetector:

@@ -7,13 +7,14 @@ import numpy as np
 
 from loop.backbone import Backbone
 from loop.class_index import ClassIndex
-from loop.dbow import Bag, WordIndex, make_bag
+from loop.dbow import make_bag
 from loop.fusion import ClassFeatures, FusionModel, load_fusion, pool_classes
 from loop.growing import GrowingArray
 from loop.memo import LastView
 from loop.segmentation.classes import MOVABLE
 from loop.timeline import Timeline
 from loop.vocabulary import Vocabulary, load_vocabulary
+from loop.word_index import Bag, WordIndex
 from semslam.config import Config, FusedConfig, LoopConfig
 from semslam.errors import ConfigError
 from semslam.types import Float32Array, FloatArray, KeyframeView, LoopCandidate, LoopEvidence, UInt8Array

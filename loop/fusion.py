@@ -10,7 +10,6 @@ from loop.weight_file import open_weights
 from semslam.types import Float32Array, FloatArray, UInt8Array
 
 SHIPPED = Path(__file__).parent / "weights" / "fusion.npz"
-POWER = 3.0
 MOVABLE_WEIGHT = 0.5
 """What a movable class counts beside structure, which stays where it is."""
 
@@ -61,10 +60,11 @@ def load_fusion(path: Path = SHIPPED) -> FusionModel:
 
 
 def pool(features: Float32Array) -> Float32Array:
-    """Generalised mean (Radenović et al., TPAMI 2019) of positive and negative parts of (h, w, C), unit (2 C,)."""
+    """Generalised mean (p = 3; Radenović et al., TPAMI 2019) of both signs of features (h, w, C), unit (2 C,)."""
     flat = features.reshape(-1, features.shape[-1])
-    parts = [np.mean(np.maximum(sign * flat, 0.0) ** POWER, axis=0) ** (1 / POWER) for sign in (1.0, -1.0)]
-    pooled = np.concatenate(parts)
+    cubes = flat * flat * flat
+    means = [np.maximum(sign * cubes, np.float32(0)).mean(axis=0) for sign in (1, -1)]
+    pooled = np.cbrt(np.concatenate(means))
     return np.asarray(pooled / max(float(np.linalg.norm(pooled)), 1e-9), dtype=np.float32)
 
 

@@ -6,8 +6,8 @@ import numpy as np
 import numpy.typing as npt
 
 from loop.class_index import ClassIndex
-from loop.dbow import Bag, WordIndex
 from loop.fusion import ClassFeatures, FusionModel
+from loop.word_index import Bag, WordIndex
 from semslam.types import Float32Array, FloatArray, IntArray
 
 DIMENSIONS = 128

@@ -6,11 +6,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from loop.class_index import ClassIndex
-from loop.dbow import WordIndex, grouped
+from loop.dbow import grouped
 from loop.fusion import ClassFeatures, FusionModel, load_fusion, pool, pool_classes
 from loop.fusion_training import learn_projection
 from loop.photo_views import make_view, overlap
 from loop.relighting import gamma, noise, relight, shadow, tint
+from loop.word_index import RECENT, WordIndex
 from semslam.errors import ModelError
 
 RNG = np.random.default_rng(0)
@@ -61,6 +62,17 @@ def test_word_score_is_one_minus_half_the_l1_distance(a: dict[int, float], b: di
     index.add((np.flatnonzero(dense[0]), dense[0][dense[0] > 0]))
     score = index.scores((np.flatnonzero(dense[1]), dense[1][dense[1] > 0]))
     assert score[0] == pytest.approx(1 - np.abs(dense[0] - dense[1]).sum() / 2, abs=1e-5)
+
+
+def test_the_index_scores_the_same_in_whatever_pieces_it_lies() -> None:
+    dense = (RNG.random((3 * RECENT + 7, 40)) * (RNG.random((3 * RECENT + 7, 40)) < 0.3)).astype(np.float32)
+    dense[5] = 0
+    index = WordIndex()
+    for row in dense:
+        index.add((np.flatnonzero(row), row[row > 0]))
+    for row in dense[[0, 5, 300]]:
+        found = index.scores((np.flatnonzero(row), row[row > 0]))
+        np.testing.assert_allclose(found, np.minimum(dense, row).sum(axis=1), atol=1e-5)
 
 
 def test_grouping_averages_over_a_window_of_time() -> None:
