@@ -42,14 +42,14 @@ def relight(color: UInt8Array, rng: np.random.Generator) -> UInt8Array:
     if kind == 0:
         return color
     if kind in {1, 2, 5}:
-        color = gamma(color, float(np.exp(rng.uniform(-0.9, 0.9))))
+        color = gamma(color, float(np.exp(rng.uniform(-1.0, 1.0))))
     if kind in {2, 3, 5}:
-        red, green, blue = np.exp(rng.uniform(-0.25, 0.25, 3))
+        red, green, blue = np.exp(rng.uniform(-0.4, 0.25, 3))
         color = tint(color, (float(red), float(green), float(blue)))
     if kind in {4, 5}:
-        color = shadow(color, rng.uniform(0, 2 * np.pi), rng.uniform(-0.5, 0.5), rng.uniform(0.2, 0.6))
+        color = shadow(color, rng.uniform(0, 2 * np.pi), rng.uniform(-0.5, 0.5), rng.uniform(0.2, 0.75))
     if rng.random() < 0.3:
-        color = noise(color, rng.uniform(0, 20), rng)
+        color = noise(color, rng.uniform(0, 25), rng)
     return color
 
 
