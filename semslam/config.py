@@ -161,6 +161,7 @@ class TrainingConfig(Section):
     encoder_rate: float = Field(0.25, ge=0, description="learning rate of the encoder as a share of the peak")
     weight_decay: float = Field(0.02, ge=0, description="decoupled weight decay")
     freeze_early: bool = Field(False, description="leave the encoder's stem and first blocks, to 1/4, as they are")
+    freeze_norms: bool = Field(False, description="keep the batch norms' statistics as they were at the start")
     warmup: float = Field(0.08, ge=0, lt=1, description="share of the steps in which the rate climbs")
     average: float = Field(0.998, ge=0, lt=1, description="decay of the weight average that is kept")
     strong_share: float = Field(0.0, ge=0, le=1, description="share of views taken close, rolled, blurred, badly lit")
@@ -325,6 +326,9 @@ class BackendConfig(Section):
         4.7, gt=0, description="Mahalanobis distance at which a loop is taken for false; 4.7 = 99.9 % of true ones"
     )
     max_iterations: int = Field(100, gt=0, description="Levenberg-Marquardt steps at the most")
+    drift_slack: float = Field(
+        1.5, ge=0, description="times max_residual that a loop may lie from odometry alone; 0 = no such test"
+    )
     max_odometry_scale: float = Field(
         10.0, ge=1, description="how far odometry's deviations may be widened where most loops contradict them"
     )

@@ -138,6 +138,8 @@ class _Run:
         self.frozen = self.network.encoder.early_layers() if settings.freeze_early else []
         for layer in self.frozen:
             layer.requires_grad_(False)
+        if settings.freeze_norms:
+            self.frozen += [module for module in self.network.modules() if isinstance(module, torch.nn.BatchNorm2d)]
         self.average = {k: v.detach().clone() for k, v in self.network.state_dict().items()}
         self.optimizer = _optimizer(self.network, settings)
         self.losses: list[float] = []
