@@ -7,6 +7,7 @@ from frontend.landmarks import NONE
 from frontend.local_map import LocalMap, MapKeyframe
 from frontend.map_pose import GATE, View
 from semslam.config import FeatureMapConfig
+from semslam.geometry import invert, transform_points
 from semslam.reprojection import Measurements
 from semslam.types import FloatArray, IntArray
 
@@ -66,6 +67,8 @@ class Mapper:
 
 
 class _WindowAdjustment:
+    """Adjusts keyframes with the landmarks that several of them see; the rest of their landmarks moves with them."""
+
     def __init__(self, the_map: LocalMap, covisible: IntArray, view: View, config: FeatureMapConfig) -> None:
         self._map = the_map
         self._steps = config.adjustment_steps
@@ -78,37 +81,35 @@ class _WindowAdjustment:
         if not len(fixed):  # the oldest holds the map in place
             oldest = free == free.min()
             free, fixed = free[~oldest], free[oldest]
-        self._free, self._landmarks = free, landmarks
+        self._free = free
         self._keyframes = np.concatenate([free, fixed])
+        views = the_map.sighting_counts(self._keyframes)[landmarks]
+        self._landmarks, self._alone = landmarks[views > 1], landmarks[views == 1]
         self._adjustment = BundleAdjustment(self._problem(view, len(free)))
 
     def _problem(self, view: View, free: int) -> BundleProblem:
         index = np.full(len(self._map.landmarks) + 1, NONE, dtype=np.int64)
         index[self._landmarks] = np.arange(len(self._landmarks))
-        pose_of, point_of, keypoints = [], [], []
+        pose_of, point_of, keypoints, measured = [], [], [], []
         for k, keyframe in enumerate(self._keyframes):
             point = index[self._map.sightings(keyframe)]
             rows = np.flatnonzero(point != NONE)
             pose_of.append(np.full(len(rows), k))
             point_of.append(point[rows])
             keypoints.append(rows)
-        order = np.argsort(np.concatenate(point_of), kind="stable")
-        measured = [
-            self._map.keyframes[k].measured.take(rows) for k, rows in zip(self._keyframes, keypoints, strict=True)
-        ]
-        seen = Measurements(
-            np.concatenate([m.stereo for m in measured])[order], np.concatenate([m.weights for m in measured])[order]
-        )
-        self._pose_of = np.concatenate(pose_of)[order]
-        self._point_of = np.concatenate(point_of)[order]
-        self._keypoint_of = np.concatenate(keypoints)[order]
+            measured.append(self._map.keyframes[keyframe].measured.take(rows))
+        self._pose_of = np.concatenate(pose_of)
+        self._keypoint_of = np.concatenate(keypoints)
         return BundleProblem(
             poses=np.stack([self._map.keyframes[k].T_map_cam for k in self._keyframes]),
             free=free,
             points=self._map.landmarks.positions[self._landmarks],
             pose_of=self._pose_of,
-            point_of=self._point_of,
-            seen=seen,
+            point_of=np.concatenate(point_of),
+            seen=Measurements(
+                np.concatenate([m.stereo for m in measured], axis=1),
+                np.concatenate([m.weights for m in measured], axis=1),
+            ),
             camera=view.camera,
             gate=GATE,
         )
@@ -125,9 +126,16 @@ class _WindowAdjustment:
         return True
 
     def _apply(self) -> None:
+        positions = self._map.landmarks.positions
+        alone = np.zeros(len(self._map.landmarks) + 1, dtype=bool)
+        alone[self._alone] = True
         for k, keyframe in enumerate(self._free):
+            sightings = self._map.sightings(keyframe)
+            mine = sightings[alone[sightings]]
+            T_new_old = self._adjustment.poses[k] @ invert(self._map.keyframes[keyframe].T_map_cam)
+            positions[mine] = transform_points(T_new_old, positions[mine])
             self._map.keyframes[keyframe].T_map_cam = self._adjustment.poses[k]
-        self._map.landmarks.positions[self._landmarks] = self._adjustment.points
+        positions[self._landmarks] = self._adjustment.points
         wrong = self._adjustment.outliers()
         for k, keyframe in enumerate(self._keyframes):
             rows = self._keypoint_of[wrong & (self._pose_of == k)]

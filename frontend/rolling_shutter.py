@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from semslam.geometry import log_so3
-from semslam.reprojection import Measurements, point_jacobians, pose_jacobians, project_stereo
+from semslam.reprojection import Measurements, pose_jacobians, project_stereo
 from semslam.types import Features, FloatArray, Intrinsics
 
 FASTEST = 0.04
@@ -91,17 +91,17 @@ class ReadoutEstimate:
             used: the read-out that was used, seconds.
         """
         delay = (pixels_v - camera.cy) / camera.height
-        J_point = point_jacobians(points_cam, camera)
-        moved = np.cross(velocity[:3], points_cam) + velocity[3:]
-        # One more second of read-out moves the rectified pixel by this much.
-        slope = (J_point @ moved[:, :, None])[:, :, 0] * delay[:, None]
+        points = points_cam.T
+        J = pose_jacobians(points, camera)
+        # One more second of read-out moves the rectified pixel by this much: as the camera's motion would, undone.
+        slope = -np.tensordot(velocity, J, 1) * delay
         weights = rectified.weights.copy()
-        weights[:, 2] = 0.0
-        residual = project_stereo(points_cam, camera) - rectified.stereo
-        J = pose_jacobians(J_point, points_cam).reshape(-1, 6)
-        JW = J * weights.reshape(-1, 1)
+        weights[2] = 0.0
+        residual = project_stereo(points, camera) - rectified.stereo
+        J = J.reshape(6, -1)
+        JW = J * weights.reshape(-1)
         # The pose has taken up what it could of the effect: only what is left of the slope speaks.
-        left = slope.reshape(-1) - J @ np.linalg.solve(JW.T @ J + 1e-9 * np.eye(6), JW.T @ slope.reshape(-1))
+        left = slope.reshape(-1) - np.linalg.solve(JW @ J.T + 1e-9 * np.eye(6), JW @ slope.reshape(-1)) @ J
         weighted = left * weights.reshape(-1)
         information = float(weighted @ left) * TRUST
         self._weight = FORGET * self._weight + information

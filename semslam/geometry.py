@@ -4,6 +4,7 @@ Transforms are (4, 4) float64 and name both frames, target first: ``T_a_b`` take
 Tangent vectors are (rx, ry, rz, tx, ty, tz), rotation first, as in GTSAM's Pose3.
 """
 
+import math
 from collections.abc import Iterable
 
 import cv2
@@ -56,6 +57,12 @@ def exp_so3(rotation_vector: npt.ArrayLike) -> FloatArray:
 
 def log_so3(R: FloatArray) -> FloatArray:
     """Rotation vector (3,) in radians of a rotation (3, 3); exact for the smallest angles and for half turns."""
+    (_, r01, r02), (r10, _, r12), (r20, r21, _) = R.tolist()
+    axis = np.array([r21 - r12, r02 - r20, r10 - r01])
+    cosine = float(R[0, 0] + R[1, 1] + R[2, 2]) - 1.0
+    if cosine > 0.0:  # less than a quarter turn: the axis is well given by the difference from the transpose
+        sine = math.hypot(*axis)
+        return np.asarray(axis * (0.5 if sine < 1e-12 else math.atan2(sine, cosine) / sine))
     q = rotations_to_quaternions(R)[0]
     length = float(np.linalg.norm(q[:3]))
     factor = 2.0 if length < 1e-12 else 2.0 * float(np.arctan2(length, q[3])) / length

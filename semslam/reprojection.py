@@ -2,6 +2,7 @@
 
 A landmark is measured as u, v and, where there is depth, a disparity ``DISPARITY / depth``: the pixel offset that a
 stereo camera would see, which gives depth the error it has in pixels (Mur-Artal and Tardós, T-RO 2017, section III).
+Arrays of measurements have one row for each quantity, so that arithmetic runs along memory.
 """
 
 from dataclasses import dataclass
@@ -26,19 +27,19 @@ class Measurements:
     """Measured landmarks of one image.
 
     Attributes:
-        stereo: (N, 3) undistorted u, v and disparity in pixels (0 where there is no depth).
-        weights: (N, 3) inverse variances in 1 / px²; the third is 0 where there is no depth.
+        stereo: (3, N) undistorted u, v and disparity in pixels (0 where there is no depth).
+        weights: (3, N) inverse variances in 1 / px²; the third is 0 where there is no depth.
     """
 
     stereo: FloatArray
     weights: FloatArray
 
     def __len__(self) -> int:
-        return len(self.stereo)
+        return int(self.stereo.shape[1])
 
-    def take(self, rows: npt.NDArray[np.generic]) -> "Measurements":
-        """The measurements of some rows, given as indices or as a mask."""
-        return Measurements(self.stereo[rows], self.weights[rows])
+    def take(self, chosen: npt.NDArray[np.generic]) -> "Measurements":
+        """Some of the measurements, given by indices or by a mask."""
+        return Measurements(self.stereo[:, chosen], self.weights[:, chosen])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,39 +64,44 @@ def measure(
 ) -> Measurements:
     """Measurements of pixels (N, 2), undistorted, with depths (N,) in metres (0 = none) and sigmas (N,) in pixels."""
     seen = depths > 0
-    disparity = np.where(seen, DISPARITY / np.where(seen, depths, 1.0), 0.0)
-    precision = 1.0 / np.asarray(sigmas, dtype=np.float64) ** 2
-    weights = np.column_stack([precision, precision, np.where(seen, DISPARITY_WEIGHT * precision, 0.0)])
-    return Measurements(np.column_stack([pixels, disparity]).astype(np.float64), weights)
+    stereo, weights = np.empty((3, len(pixels))), np.empty((3, len(pixels)))
+    stereo[:2] = pixels.T
+    stereo[2] = np.where(seen, DISPARITY / np.where(seen, depths, 1.0), 0.0)
+    weights[:2] = 1.0 / np.asarray(sigmas, dtype=np.float64) ** 2
+    weights[2] = np.where(seen, DISPARITY_WEIGHT * weights[0], 0.0)
+    return Measurements(stereo, weights)
+
+
+def into_camera(T_ref_cam: FloatArray, points_ref: FloatArray) -> FloatArray:
+    """Coordinates (3, N) in a camera of points (N, 3) in the reference frame."""
+    R = T_ref_cam[:3, :3]
+    return np.asarray(R.T @ points_ref.T - (R.T @ T_ref_cam[:3, 3])[:, None])
 
 
 def project_stereo(points_cam: FloatArray, camera: Intrinsics) -> FloatArray:
-    """u, v and disparity (N, 3) in pixels of camera-frame points (N, 3); meaningful where z > NEAREST."""
-    z = np.maximum(points_cam[:, 2], NEAREST)
-    return np.column_stack(
-        [camera.fx * points_cam[:, 0] / z + camera.cx, camera.fy * points_cam[:, 1] / z + camera.cy, DISPARITY / z]
-    )
+    """u, v and disparity (3, N) in pixels of camera-frame points (3, N); meaningful where z > NEAREST."""
+    inverse = 1.0 / np.maximum(points_cam[2], NEAREST)
+    out = np.empty_like(points_cam)
+    out[0] = camera.fx * points_cam[0] * inverse + camera.cx
+    out[1] = camera.fy * points_cam[1] * inverse + camera.cy
+    out[2] = DISPARITY * inverse
+    return out
 
 
-def point_jacobians(points_cam: FloatArray, camera: Intrinsics) -> FloatArray:
-    """Derivative (N, 3, 3) of ``project_stereo`` by the camera-frame point."""
-    x, y, z = points_cam[:, 0], points_cam[:, 1], np.maximum(points_cam[:, 2], NEAREST)
-    J = np.zeros((len(points_cam), 3, 3))
-    J[:, 0, 0], J[:, 0, 2] = camera.fx / z, -camera.fx * x / z**2
-    J[:, 1, 1], J[:, 1, 2] = camera.fy / z, -camera.fy * y / z**2
-    J[:, 2, 2] = -DISPARITY / z**2
-    return J
+def pose_jacobians(points_cam: FloatArray, camera: Intrinsics) -> FloatArray:
+    """Derivative (6, 3, N) of ``project_stereo`` by the pose's right tangent, for points (3, N) in view.
 
-
-def pose_jacobians(J_point: FloatArray, points_cam: FloatArray) -> FloatArray:
-    """Derivative (N, 3, 6) by the pose's right tangent: T_ref_cam Exp(xi) moves a camera-frame point by p x w - v."""
-    J = np.empty((len(points_cam), 3, 6))
-    x, y, z = points_cam.T[:, :, None]
-    # Rows of J_point times the matrix [p]x, which is the cross product of each row with p.
-    J[:, :, 0] = J_point[:, :, 1] * z - J_point[:, :, 2] * y
-    J[:, :, 1] = J_point[:, :, 2] * x - J_point[:, :, 0] * z
-    J[:, :, 2] = J_point[:, :, 0] * y - J_point[:, :, 1] * x
-    J[:, :, 3:] = -J_point
+    T_ref_cam Exp(w, v) moves a camera-frame point p by p x w - v: rows 3 to 5 are thus the negative derivative by p.
+    """
+    inverse = 1.0 / np.maximum(points_cam[2], NEAREST)
+    a, b = points_cam[0] * inverse, points_cam[1] * inverse
+    fx, fy, d = camera.fx, camera.fy, DISPARITY * inverse
+    J = np.zeros((6, 3, points_cam.shape[1]))
+    J[0, 0], J[0, 1], J[0, 2] = fx * a * b, fy * (1.0 + b * b), d * b
+    J[1, 0], J[1, 1], J[1, 2] = -fx * (1.0 + a * a), -fy * a * b, -d * a
+    J[2, 0], J[2, 1] = fx * b, -fy * a
+    J[3, 0], J[4, 1] = -fx * inverse, -fy * inverse
+    J[5, 0], J[5, 1], J[5, 2] = fx * inverse * a, fy * inverse * b, d * inverse
     return J
 
 
@@ -106,9 +112,19 @@ def retract(T: FloatArray, tangent: FloatArray) -> FloatArray:
 
 def squared_errors(T_ref_cam: FloatArray, points_ref: FloatArray, seen: Measurements, camera: Intrinsics) -> FloatArray:
     """Weighted squared residuals (N,) of points (N, 3); infinite for those behind the camera."""
-    p = (points_ref - T_ref_cam[:3, 3]) @ T_ref_cam[:3, :3]
-    error = ((seen.stereo - project_stereo(p, camera)) ** 2 * seen.weights).sum(1)
-    return np.where(p[:, 2] > NEAREST, error, np.inf)
+    p = into_camera(T_ref_cam, points_ref)
+    return gated_errors(seen.stereo - project_stereo(p, camera), seen.weights, p[2])
+
+
+def gated_errors(residual: FloatArray, weights: FloatArray, z: FloatArray) -> FloatArray:
+    """Weighted squared residuals (N,) of residuals (3, N); infinite where the depth z (N,) is not in view."""
+    return np.where(z > NEAREST, (residual * residual * weights).sum(0), np.inf)
+
+
+def huber_weights(residual: FloatArray, weights: FloatArray, z: FloatArray, gate: float) -> FloatArray:
+    """Weights (3, N) that let residuals (3, N) beyond a gate count by their size alone, and those out of view not."""
+    error = (residual * residual * weights).sum(0)
+    return np.asarray(weights * (np.sqrt(gate / np.maximum(error, gate)) * (z > NEAREST)))
 
 
 def refine_pose(
@@ -154,7 +170,7 @@ def refine_pose(
         kept = errors <= gate
     if kept.sum() < 4:
         return None
-    freedom = np.count_nonzero(seen.weights[kept]) - 6
+    freedom = np.count_nonzero(seen.weights[:, kept]) - 6
     variance = errors[kept].sum() / max(freedom, 1)
     return PoseEstimate(orthonormalise(T), np.linalg.inv(H) * max(variance, 0.1), errors, kept)
 
@@ -162,14 +178,13 @@ def refine_pose(
 def _gauss_newton(
     T: FloatArray, points: FloatArray, seen: Measurements, camera: Intrinsics, gate: float
 ) -> tuple[FloatArray, FloatArray | None]:
-    p = (points - T[:3, 3]) @ T[:3, :3]
+    p = into_camera(T, points)
     residual = seen.stereo - project_stereo(p, camera)
-    error = (residual**2 * seen.weights).sum(1)
-    huber = np.minimum(1.0, np.sqrt(gate / np.maximum(error, 1e-12))) * (p[:, 2] > NEAREST)
-    J = pose_jacobians(point_jacobians(p, camera), p).reshape(-1, 6)
-    weighted = J * (seen.weights * huber[:, None]).reshape(-1, 1)
-    H = weighted.T @ J
-    ok, step = cv2.solve(H, weighted.T @ residual.reshape(-1, 1), flags=cv2.DECOMP_CHOLESKY)
+    weights = huber_weights(residual, seen.weights, p[2], gate)
+    J = pose_jacobians(p, camera).reshape(6, -1)
+    weighted = J * weights.reshape(-1)
+    H = weighted @ J.T
+    ok, step = cv2.solve(H, weighted @ residual.reshape(-1, 1), flags=cv2.DECOMP_CHOLESKY)
     if not ok or not np.isfinite(step).all():
         return H, None
     return H, np.asarray(step.ravel(), dtype=np.float64)
