@@ -13,6 +13,8 @@ MAX_HAMMING = 64
 """Of 256 bits; unrelated ORB descriptors differ by about 110 at the nearest."""
 RATIO = 0.85
 """A landmark's best keypoint must be this much nearer than its second, where both are of one pyramid level."""
+FARTHER = 512
+"""More bits than descriptors have."""
 MIN_COSINE = 0.5
 """Cosine of the angle between a landmark's first view and this one; beyond it, the patch looks different."""
 
@@ -48,19 +50,16 @@ class KeypointGrid:
         self._starts = np.searchsorted(index[self._order], np.arange(self._rows * self._columns + 1))
 
     def near(self, pixels: FloatArray) -> tuple[IntArray, IntArray]:
-        """Pairs (row of ``pixels``, keypoint) whose cells are the same or touch."""
+        """Pairs (row of ``pixels``, keypoint) whose cells are the same or touch; rows ascend."""
         place = self._place(pixels)
-        queries, keypoints = [], []
-        for row in (-1, 0, 1):
-            # Three neighbouring cells of one row of cells lie behind one another in the order.
-            first = np.clip(place[:, 1] + row, 0, self._rows - 1) * self._columns + place[:, 0]
-            starts = self._starts[np.maximum(first - 1, 0)]
-            counts = self._starts[np.minimum(first + 2, len(self._starts) - 1)] - starts
-            query = np.repeat(np.arange(len(pixels)), counts)
-            within = np.arange(len(query)) - np.repeat(np.cumsum(counts) - counts, counts)
-            queries.append(query)
-            keypoints.append(self._order[starts[query] + within])
-        return np.concatenate(queries), np.concatenate(keypoints)
+        # Three neighbouring cells of one row of cells lie behind one another in the order.
+        first = (place[:, 1, None] + (-1, 0, 1)) * self._columns + place[:, 0, None] - 1
+        starts = self._starts[first].reshape(-1)
+        counts = self._starts[first + 3].reshape(-1) - starts
+        ends = np.cumsum(counts)
+        within = np.arange(ends[-1] if len(ends) else 0) - np.repeat(ends - counts - starts, counts)
+        query = np.repeat(np.arange(len(pixels)), counts.reshape(-1, 3).sum(1))
+        return query, self._order[within]
 
     def _place(self, pixels: FloatArray) -> IntArray:
         cells = np.floor(pixels / self._cell).astype(np.int64) + 1
@@ -89,40 +88,55 @@ def match_guided(
         radius: pixels around the predicted place; larger for coarser pyramid levels.
         scale: factor between pyramid levels.
     """
-    rays = landmarks.positions[wanted] - T_map_cam[:3, 3]
-    points = rays @ T_map_cam[:3, :3]
-    distance = np.linalg.norm(points, axis=1)
-    pixels = camera.project(np.where(points[:, 2:] > NEAREST, points, np.nan))
-    cosine = (rays * landmarks.directions[wanted]).sum(1) / np.maximum(distance, NEAREST)
-    with np.errstate(invalid="ignore"):
-        in_view = ((pixels >= 0) & (pixels < (camera.width, camera.height))).all(1) & (cosine > MIN_COSINE)
-    level = np.log(landmarks.reach[wanted] / np.maximum(distance, NEAREST)) / np.log(scale)
-    in_view &= level > -1.5
-    wanted, pixels, level = wanted[in_view], pixels[in_view], level[in_view]
-
+    wanted, pixels, level = _in_view(landmarks, wanted, T_map_cam, camera, scale)
     query, keypoint = grid.near(pixels)
     octave = features.octaves[keypoint]
     offset = features.pixels[keypoint] - pixels[query]
-    kept = (np.abs(octave - level[query]) < 1.6) & ((offset**2).sum(1) < radius**2)
+    distance = offset[:, 0] * offset[:, 0] + offset[:, 1] * offset[:, 1]
+    kept = np.flatnonzero((distance < radius**2) & (np.abs(octave - level[query]) < 1.6))
     query, keypoint = query[kept], keypoint[kept]
     ours = landmarks.descriptors[wanted].view(np.uint64)[query]
     theirs = features.descriptors.view(np.uint64)[keypoint]
-    hamming = np.bitwise_count(ours ^ theirs).sum(1, dtype=np.int64)
+    hamming = np.bitwise_count(ours ^ theirs) @ np.ones(4, dtype=np.int64)
     query, keypoint = _choose(query, keypoint, hamming, features.octaves)
     return Matches(wanted[query], keypoint, wanted)
 
 
+def _in_view(
+    landmarks: Landmarks, wanted: IntArray, T_map_cam: FloatArray, camera: Intrinsics, scale: float
+) -> tuple[IntArray, FloatArray, FloatArray]:
+    """Which landmarks should be seen, where (N, 2) in pixels, and in which pyramid level (N,)."""
+    rays = landmarks.positions[wanted] - T_map_cam[:3, 3]
+    points = rays @ T_map_cam[:3, :3]
+    z = np.maximum(points[:, 2], NEAREST)
+    u = camera.fx * points[:, 0] / z + camera.cx
+    v = camera.fy * points[:, 1] / z + camera.cy
+    distance = np.maximum(np.sqrt(np.einsum("ij,ij->i", rays, rays)), NEAREST)
+    cosine = np.einsum("ij,ij->i", rays, landmarks.directions[wanted]) / distance
+    level = np.log(landmarks.reach[wanted] / distance) / np.log(scale)
+    kept = (points[:, 2] > NEAREST) & (cosine > MIN_COSINE) & (level > -1.5)
+    kept &= (u >= 0) & (u < camera.width) & (v >= 0) & (v < camera.height)
+    return wanted[kept], np.column_stack([u[kept], v[kept]]), level[kept]
+
+
 def _choose(query: IntArray, keypoint: IntArray, hamming: IntArray, octaves: UInt8Array) -> tuple[IntArray, IntArray]:
-    """The best keypoint of each query, if it is good and clear, and of the queries of one keypoint the best."""
-    order = np.argsort(query * 512 + hamming, kind="stable")
-    query, keypoint, hamming = query[order], keypoint[order], hamming[order]
-    first = np.r_[True, query[1:] != query[:-1]] if len(query) else np.zeros(0, dtype=bool)
-    rival = np.r_[~first[1:], False] if len(query) else first
-    following = np.minimum(np.arange(len(query)) + 1, max(len(query) - 1, 0))
-    clear = ~rival | (hamming < RATIO * hamming[following]) | (octaves[keypoint] != octaves[keypoint[following]])
-    best = first & clear & (hamming <= MAX_HAMMING)
-    query, keypoint, hamming = query[best], keypoint[best], hamming[best]
-    order = np.argsort(keypoint * 512 + hamming, kind="stable")
-    once = np.r_[True, np.diff(keypoint[order]) > 0] if len(order) else np.zeros(0, dtype=bool)
-    chosen = np.sort(order[once])
+    """The best keypoint of each query, if it is good and clear, and of the queries of one keypoint the best.
+
+    The queries ascend.
+    """
+    if not len(query):
+        return query, keypoint
+    starts = np.flatnonzero(np.diff(query, prepend=-1))
+    # Distance and place in one number: the smallest is the nearest, and of equals the first.
+    rank = hamming * len(query) + np.arange(len(query))
+    best = np.minimum.reduceat(rank, starts)
+    place = best % len(query)
+    rank[place] = FARTHER * len(query)
+    rival = np.minimum.reduceat(rank, starts)
+    nearest, second, rival = best // len(query), rival // len(query), rival % len(query)
+    clear = (nearest < RATIO * second) | (octaves[keypoint[place]] != octaves[keypoint[rival]])
+    good = place[clear & (nearest <= MAX_HAMMING)]
+    rank = np.full(len(octaves), FARTHER * len(query), dtype=np.int64)
+    np.minimum.at(rank, keypoint[good], hamming[good] * len(query) + good)
+    chosen = good[rank[keypoint[good]] % len(query) == good]
     return query[chosen], keypoint[chosen]

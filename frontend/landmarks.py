@@ -7,6 +7,13 @@ from semslam.types import FloatArray, IntArray, UInt8Array
 
 NONE = -1
 """In place of a landmark's identity: a keypoint that belongs to none."""
+OBSERVERS = 32
+"""Keyframes that a landmark remembers to have been seen from: the latest, so that no search grows with the map."""
+
+
+_COLUMNS = (
+    "positions", "descriptors", "directions", "reach", "born", "visible", "found", "alive", "sightings", "observers",
+)  # fmt: skip
 
 
 class Landmarks:
@@ -21,6 +28,7 @@ class Landmarks:
         visible: (M,) how often each should have been seen.
         found: (M,) how often it was.
         alive: (M,) bool.
+        observers: (M, OBSERVERS) keyframes that saw each last, in no order; NONE where there are fewer.
     """
 
     def __init__(self) -> None:
@@ -33,6 +41,8 @@ class Landmarks:
         self._visible = np.zeros(1024, dtype=np.int64)
         self._found = np.zeros(1024, dtype=np.int64)
         self._alive = np.zeros(1024, dtype=bool)
+        self._sightings = np.zeros(1024, dtype=np.int64)
+        self._observers = np.full((1024, OBSERVERS), NONE, dtype=np.int32)
 
     def __len__(self) -> int:
         return self._count
@@ -77,6 +87,16 @@ class Landmarks:
         """(M,) bool; may be written."""
         return self._alive[: self._count]
 
+    @property
+    def observers(self) -> npt.NDArray[np.int32]:
+        """(M, OBSERVERS) keyframe ids."""
+        return self._observers[: self._count]
+
+    def note(self, landmarks: IntArray, keyframe: int) -> None:
+        """Remember that a keyframe sees some landmarks."""
+        self._observers[landmarks, self._sightings[landmarks] % OBSERVERS] = keyframe
+        self._sightings[landmarks] += 1
+
     def add(
         self,
         positions: FloatArray,
@@ -96,12 +116,14 @@ class Landmarks:
         self._born[rows] = keyframe
         self._visible[rows] = self._found[rows] = 1
         self._alive[rows] = True
+        self._sightings[rows] = 0
+        self._observers[rows] = NONE
         return np.arange(first, self._count)
 
     def _grow(self) -> None:
         if self._count <= len(self._positions):
             return
-        for name in ("positions", "descriptors", "directions", "reach", "born", "visible", "found", "alive"):
+        for name in _COLUMNS:
             old = getattr(self, f"_{name}")
             new = np.zeros((2 * self._count, *old.shape[1:]), dtype=old.dtype)
             new[: len(old)] = old

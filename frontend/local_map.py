@@ -62,6 +62,7 @@ class LocalMap:
             self._sightings = np.concatenate([self._sightings, np.full_like(self._sightings, NONE)])
             self._maps = np.concatenate([self._maps, np.zeros_like(self._maps)])
         self._sightings[keyframe.id, : len(sightings)] = sightings
+        self.landmarks.note(sightings[sightings != NONE], keyframe.id)
         self._maps[keyframe.id] = map_id
         self.keyframes.append(keyframe)
         return keyframe
@@ -80,6 +81,7 @@ class LocalMap:
             keyframe.id,
         )
         self.sightings(keyframe.id)[rows] = ids
+        self.landmarks.note(ids, keyframe.id)
         return ids
 
     def covisible(self, landmarks: IntArray, map_id: int, least: int = 1) -> IntArray:
@@ -96,10 +98,9 @@ class LocalMap:
         return [int(keyframe) for keyframe in order[shared[order] > 0]]
 
     def _shared(self, landmarks: IntArray) -> IntArray:
-        wanted = np.zeros(len(self.landmarks) + 1, dtype=bool)
-        wanted[landmarks] = True
-        wanted[NONE] = False
-        return np.asarray(wanted[self._sightings[: len(self.keyframes)]].sum(1), dtype=np.int64)
+        """How many of the landmarks each keyframe is remembered to have seen (K,)."""
+        observers = self.landmarks.observers[landmarks[landmarks != NONE]]
+        return np.bincount(observers[observers != NONE], minlength=len(self.keyframes))
 
     def seen_from(self, keyframes: IntArray) -> IntArray:
         """Identities of the living landmarks that some keyframes see, ascending."""
