@@ -34,8 +34,10 @@ class FeatureMapOdometry:
         self._config = config.feature_map
         self._bridge = bridge or NoBridge()
         self._seed = config.seed
-        self._scale = config.features.scale
-        self._extractor = FeatureExtractor(config.features)
+        # Fewer and wider levels than the verification's: cheaper, and landmarks are placed better.
+        self._scale = config.feature_map.scale
+        pyramid = {"levels": config.feature_map.levels, "scale": config.feature_map.scale}
+        self._extractor = FeatureExtractor(config.features.model_copy(update=pyramid))
         self._map = LocalMap(config.features.count, self._scale)
         self._mapper = Mapper(self._map, config.feature_map)
         self._prediction = ConstantVelocity()
