@@ -57,6 +57,11 @@ class FeatureMapOdometry:
         """Build it from the settings."""
         return cls(config)
 
+    @property
+    def readout_seconds(self) -> float:
+        """The read-out time of the rolling shutter as believed now, seconds."""
+        return self._readout.seconds
+
     def track(self, frame: Frame) -> Motion:
         """Motion since the previous frame, with the landmarks seen; LOST where the frame's place was not found.
 
@@ -74,6 +79,8 @@ class FeatureMapOdometry:
         self._mapper.proceed()
         if not self._started:
             self._started = True
+            if self._config.readout is None:
+                self._readout = ReadoutEstimate(frame.intrinsics.readout, self._config.readout_sigma)
             self._prediction.tracked(frame.timestamp, np.eye(4))
             self._start_map(self._view(frame, raw, np.zeros(6)))
             return first_motion()

@@ -15,6 +15,8 @@ from semslam.types import Features, FloatArray, Intrinsics
 
 FASTEST = 0.04
 """Seconds; no read-out is longer than a frame at 25 Hz."""
+USUAL = 0.026
+"""Seconds; a Kinect's, where the camera does not say."""
 FORGET = 0.97
 """What a frame's say in the estimate keeps at the next frame."""
 
@@ -55,11 +57,16 @@ def rectify(features: Features, camera: Intrinsics, velocity: FloatArray, readou
 
 
 class ReadoutEstimate:
-    """The read-out time, from how residuals grow with a row's delay and the camera's velocity."""
+    """The read-out time, from how residuals grow with a row's delay and the camera's velocity.
 
-    def __init__(self, seconds: float, sigma: float) -> None:
-        self._prior = seconds
-        self._prior_weight = 1.0 / sigma**2 if sigma > 0 else np.inf
+    Args:
+        seconds: what is believed before; 0 = all rows at once, which is not doubted; None = not known.
+        sigma: how far that may be off, seconds; 0 = not at all.
+    """
+
+    def __init__(self, seconds: float | None, sigma: float) -> None:
+        self._prior = USUAL if seconds is None else seconds
+        self._prior_weight = 1.0 / sigma**2 if sigma > 0 and self._prior > 0 else np.inf
         self._weight = 0.0
         self._sum = 0.0
 

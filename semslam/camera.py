@@ -25,9 +25,11 @@ class Intrinsics:
         cx: principal point, u in pixels.
         cy: principal point, v in pixels.
         distortion: k1, k2, p1, p2, k3 of the Brown model (OpenCV's order).
+        readout: seconds from the exposure of the first row to that of the last (rolling shutter); 0 = all rows at
+            once, None = not known.
 
     Raises:
-        ConfigError: a size or focal length is not positive, or a figure is not finite.
+        ConfigError: a size or focal length is not positive, the read-out is negative, or a figure is not finite.
     """
 
     width: int
@@ -37,10 +39,13 @@ class Intrinsics:
     cx: float
     cy: float
     distortion: tuple[float, float, float, float, float] = NO_DISTORTION
+    readout: float | None = None
 
     def __post_init__(self) -> None:
-        figures = (self.fx, self.fy, self.cx, self.cy, *self.distortion)
-        if not np.isfinite(figures).all() or min(self.width, self.height, self.fx, self.fy) <= 0:
+        readout = 0.0 if self.readout is None else self.readout
+        figures = (self.fx, self.fy, self.cx, self.cy, *self.distortion, readout)
+        positive = min(self.width, self.height, self.fx, self.fy) > 0 and readout >= 0
+        if not np.isfinite(figures).all() or not positive:
             raise ConfigError(f"These camera intrinsics are not usable: {self}.")
 
     @property
@@ -86,7 +91,7 @@ class Intrinsics:
         """The camera of the same image resized by ``factor``, pixel centres at whole numbers."""
         return Intrinsics(
             round(self.width * factor), round(self.height * factor), self.fx * factor, self.fy * factor,
-            (self.cx + 0.5) * factor - 0.5, (self.cy + 0.5) * factor - 0.5, self.distortion,
+            (self.cx + 0.5) * factor - 0.5, (self.cy + 0.5) * factor - 0.5, self.distortion, self.readout,
         )  # fmt: skip
 
 

@@ -90,7 +90,7 @@ class FeatureMapConfig(Section):
     sure_inliers: int = Field(40, gt=5, description="landmarks below which a pose is called degraded")
     min_landmarks: int = Field(50, gt=5, description="keypoints with depth that a keyframe must have")
     restart_seconds: float = Field(0.5, ge=0, description="a new map starts when good images meet none for so long")
-    readout: float = Field(0.026, ge=0, description="seconds from an image's first row to its last (rolling shutter)")
+    readout: float | None = Field(None, ge=0, description="seconds from first row to last; none = the camera's")
     readout_sigma: float = Field(0.005, ge=0, description="its uncertainty before it is estimated; 0 = known")
     radius: float = Field(15.0, gt=0, description="pixels around a landmark's predicted place that are searched")
     narrow_radius: float = Field(10.0, gt=0, description="the same once the pose is nearly known")

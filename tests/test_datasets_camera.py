@@ -1,5 +1,6 @@
 """camera.yaml, and which source of a camera wins."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -29,6 +30,14 @@ def test_distortion_and_scale_may_be_left_out(tmp_path: Path) -> None:
     assert setup.depth_scale is None
 
 
+@pytest.mark.parametrize("readout", [0.0, 0.02, None])
+def test_the_read_out_belongs_to_the_camera(readout: float | None, tmp_path: Path) -> None:
+    write_camera(tmp_path / "camera.yaml", replace(CAMERA, readout=readout), 1000.0)
+    camera = read_camera(tmp_path / "camera.yaml").intrinsics
+    assert camera.readout == readout
+    assert camera.scaled(0.5).readout == readout
+
+
 def test_a_negative_fy_means_that_y_points_up(tmp_path: Path) -> None:
     (tmp_path / "camera.yaml").write_text(TEXT.replace("fy: 251", "fy: -251"))
     setup = read_camera(tmp_path / "camera.yaml")
@@ -51,6 +60,8 @@ def test_a_negative_fy_means_that_y_points_up(tmp_path: Path) -> None:
         (TEXT + "distortion: [1, 2]\n", "k1 k2 p1 p2 k3"),
         (TEXT + "distortion: [1, 2, 3, 4, x]\n", "must be a number"),
         (TEXT + "depth_scale: -1\n", "not positive"),
+        (TEXT + "readout: -0.01\n", "not usable"),
+        (TEXT + "readout: fast\n", "'readout' must be a number"),
     ],
 )
 def test_an_unusable_file_is_refused_in_one_sentence(tmp_path: Path, text: str, reason: str) -> None:

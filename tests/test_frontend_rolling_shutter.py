@@ -1,15 +1,20 @@
 """Taking the rolling shutter out of keypoints."""
 
+from dataclasses import replace
+
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from frontend.feature_map import FeatureMapOdometry
 from frontend.rolling_shutter import ReadoutEstimate, rectify, velocity_of
 from semslam.camera import Intrinsics
+from semslam.config import Config, FeatureMapConfig
 from semslam.features import lift
 from semslam.geometry import exp_so3, invert, make_transform, transform_points
 from semslam.reprojection import measure
-from semslam.types import Features, FloatArray
+from semslam.types import Features, FloatArray, Frame
 
 CAMERA = Intrinsics(640, 480, 525.0, 525.0, 320.0, 240.0)
 
@@ -80,10 +85,20 @@ def test_readout_is_estimated_from_residuals() -> None:
         assert abs(estimate.seconds - true) < 0.004
 
 
-def test_known_readout_is_kept() -> None:
-    estimate = ReadoutEstimate(0.02, 0.0)
+@pytest.mark.parametrize(("believed", "sigma"), [(0.02, 0.0), (0.0, 0.005)])
+def test_known_readout_is_kept(believed: float, sigma: float) -> None:
+    estimate = ReadoutEstimate(believed, sigma)
     points, velocity = world(1)
     bent = rolling(points, velocity, 0.0)
     measured = measure(bent.pixels, bent.depths, np.ones(len(points)))
-    estimate.learn(points, measured, bent.pixels[:, 1].astype(np.float64), CAMERA, velocity, 0.02)
-    assert estimate.seconds == 0.02
+    estimate.learn(points, measured, bent.pixels[:, 1].astype(np.float64), CAMERA, velocity, believed)
+    assert estimate.seconds == believed
+
+
+def test_the_setting_wins_over_the_camera_and_the_camera_over_the_usual() -> None:
+    camera = replace(CAMERA, readout=0.0)
+    black = np.zeros((480, 640, 3), dtype=np.uint8)
+    for setting, seen_by, wanted in ((None, camera, 0.0), (None, CAMERA, 0.026), (0.01, camera, 0.01)):
+        odometry = FeatureMapOdometry(Config(feature_map=FeatureMapConfig(readout=setting)))
+        odometry.track(Frame(0, 0.0, black, np.zeros((480, 640), dtype=np.float32), seen_by))
+        assert odometry.readout_seconds == wanted

@@ -12,7 +12,7 @@ from semslam.errors import ConfigError, DatasetError
 
 CAMERA_FILE = "camera.yaml"
 _REQUIRED = ("width", "height", "fx", "fy", "cx", "cy")
-_OPTIONAL = ("distortion", "depth_scale")
+_OPTIONAL = ("distortion", "depth_scale", "readout")
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +32,7 @@ class CameraSetup:
 
 
 def read_camera(path: Path) -> CameraSetup:
-    """Read a camera.yaml: width height fx fy cx cy, and optionally distortion (k1 k2 p1 p2 k3) and depth_scale.
+    """Read a camera.yaml: width height fx fy cx cy; optionally distortion (k1 k2 p1 p2 k3), depth_scale, readout.
 
     A negative fy is read as in ICL-NUIM: the images are upright all the same, so the camera gets its size, and
     ``y_up`` says that the poses are mirrored.
@@ -52,8 +52,9 @@ def read_camera(path: Path) -> CameraSetup:
     if depth_scale is not None and depth_scale <= 0:
         raise DatasetError(f"The camera file {path} gives a depth_scale that is not positive: {depth_scale}.")
     distortion = _distortion(values.get("distortion"), path)
+    readout = _number(values, "readout", path) if "readout" in values else None
     try:
-        intrinsics = Intrinsics(int(width), int(height), fx, abs(fy), cx, cy, distortion)
+        intrinsics = Intrinsics(int(width), int(height), fx, abs(fy), cx, cy, distortion, readout)
     except ConfigError as error:
         raise DatasetError(f"The camera file {path}: {error}") from error
     return CameraSetup(intrinsics, depth_scale, y_up=fy < 0)
@@ -72,6 +73,8 @@ def write_camera(path: Path, intrinsics: Intrinsics, depth_scale: float) -> None
     """
     values = {key: getattr(intrinsics, key) for key in _REQUIRED}
     values |= {"distortion": list(intrinsics.distortion), "depth_scale": depth_scale}
+    if intrinsics.readout is not None:
+        values["readout"] = intrinsics.readout
     try:
         path.write_text(yaml.safe_dump(values, sort_keys=False, default_flow_style=None), encoding="utf-8")
     except OSError as error:

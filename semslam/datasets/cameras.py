@@ -13,6 +13,8 @@ from semslam.datasets.camera_file import CAMERA_FILE, CameraSetup, read_camera
 from semslam.geometry import FloatArray, make_transform, orthonormalise
 
 TUM_DEPTH_SCALE = 5000.0
+KINECT_READOUT = 0.026
+"""Seconds that the colour camera of a Kinect or Xtion takes from its first row to its last; estimated on fr1/rpy."""
 ROS_DEFAULT = Intrinsics(640, 480, 525.0, 525.0, 319.5, 239.5)
 
 
@@ -57,7 +59,7 @@ class KnownSequence:
 
 def _setup(fx: float, fy: float, cx: float, cy: float, *distortion: float) -> CameraSetup:
     k1, k2, p1, p2, k3 = distortion or (0.0, 0.0, 0.0, 0.0, 0.0)
-    return CameraSetup(Intrinsics(640, 480, fx, fy, cx, cy, (k1, k2, p1, p2, k3)), TUM_DEPTH_SCALE)
+    return CameraSetup(Intrinsics(640, 480, fx, fy, cx, cy, (k1, k2, p1, p2, k3), KINECT_READOUT), TUM_DEPTH_SCALE)
 
 
 KNOWN_SEQUENCES = (
@@ -77,7 +79,7 @@ KNOWN_SEQUENCES = (
     ),
     KnownSequence(
         r"icl_?-?nuim|(?:living|office)_room_traj|traj\d_frei_png",
-        replace(_setup(481.20, 480.0, 319.5, 239.5), y_up=True),
+        CameraSetup(Intrinsics(640, 480, 481.20, 480.0, 319.5, 239.5, readout=0.0), TUM_DEPTH_SCALE, y_up=True),
         numbered=True,
     ),
 )

@@ -8,7 +8,7 @@ import numpy as np
 from semslam.camera import Intrinsics
 from semslam.config import DatasetConfig
 from semslam.datasets.camera_file import CameraSetup
-from semslam.datasets.cameras import find_camera
+from semslam.datasets.cameras import KINECT_READOUT, find_camera
 from semslam.datasets.image_sequence import ImagePair, ImageSequence
 from semslam.datasets.images import read_depth
 from semslam.datasets.registration import register_depth
@@ -16,7 +16,7 @@ from semslam.errors import DatasetError
 from semslam.geometry import FloatArray, invert, is_rigid, make_transform, orthonormalise
 from semslam.types import Float32Array, Trajectory
 
-COLOR_CAMERA = Intrinsics(640, 480, 525.0, 525.0, 320.0, 240.0)
+COLOR_CAMERA = Intrinsics(640, 480, 525.0, 525.0, 320.0, 240.0, readout=KINECT_READOUT)
 DEPTH_CAMERA = Intrinsics(640, 480, 585.0, 585.0, 320.0, 240.0)
 MILLIMETRES = 1000.0
 NO_DEPTH = 65535

@@ -105,7 +105,7 @@ class SyntheticDataset:
         """A Kinect-like pinhole without distortion."""
         width, height = self._request.width, self._request.width * 3 // 4
         focal = FIELD_OF_VIEW * width
-        return Intrinsics(width, height, focal, focal, (width - 1) / 2, (height - 1) / 2)
+        return Intrinsics(width, height, focal, focal, (width - 1) / 2, (height - 1) / 2, readout=0.0)
 
     @cached_property
     def timestamps(self) -> list[float]:
