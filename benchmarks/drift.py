@@ -23,7 +23,7 @@ from semslam.datasets import Dataset, open_dataset
 from semslam.datasets.selection import Selection
 from semslam.metrics import Metrics
 from semslam.pipeline import replay, run
-from semslam.recording import read_front_end, write_recording
+from semslam.recording import read_recording, write_recording
 from semslam.types import Frame
 
 ROWS = "rows.csv"
@@ -72,7 +72,7 @@ def measure(arguments: argparse.Namespace) -> None:
                 for detector in filter(None, arguments.detectors.split(",")):
                     if (whole.name, odometry, str(start), detector) not in done:
                         again = config.with_changes(detector=detector)
-                        result = replay(dataset, read_front_end(kept).recording, again)
+                        result = replay(dataset, read_recording(kept), again)
                         add_row(rows, row_of(result.metrics, start))
 
 
@@ -83,7 +83,6 @@ def record(dataset: Dataset, config: Config, directory: Path) -> None:
     recording = run(dataset, config).recording
     partial = directory.with_suffix(".partial")
     partial.mkdir(exist_ok=True)
-    (partial / "config.yaml").write_text(config.dump(), encoding="utf-8")
     write_recording(partial, recording)
     partial.rename(directory)
     print(f"recorded {directory.name}", flush=True)

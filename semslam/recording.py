@@ -135,23 +135,34 @@ def read_front_end(directory: Path) -> SavedFrontEnd:
         ResultsError: it is no run folder, was written by an earlier version, or its recording is damaged.
         ConfigError: its settings cannot be read.
     """
+    recording, source = read_recording(directory), directory / SOURCE
+    try:
+        named = source.read_text(encoding="utf-8").strip() if source.exists() else None
+    except (OSError, UnicodeDecodeError) as error:
+        raise ResultsError(f"{source} cannot be read.") from error
+    return SavedFrontEnd(load_config(directory / "config.yaml"), recording, named)
+
+
+def read_recording(directory: Path) -> Recording:
+    """Read what ``write_recording`` wrote into a folder.
+
+    Raises:
+        ResultsError: there is no recording, or it is damaged.
+    """
     path = directory / RECORDING
     if not path.is_file():
         raise ResultsError(f"{directory} cannot be replayed: it has no {RECORDING}.")
-    source = directory / SOURCE
     try:
         with np.load(path, allow_pickle=False) as file:
             arrays = {name: file[name] for name in file.files}
-        recording = Recording(
+        return Recording(
             frames=_frames(arrays),
             unreadable=tuple(str(text) for text in arrays["unreadable"]),
             interrupted=bool(arrays["interrupted"]),
             checksum=int(arrays["checksum"]),
         )
-        named = source.read_text(encoding="utf-8").strip() if source.exists() else None
     except (OSError, EOFError, KeyError, IndexError, TypeError, ValueError, zipfile.BadZipFile, zlib.error) as error:
         raise ResultsError(f"The saved front end in {directory} is damaged.") from error
-    return SavedFrontEnd(load_config(directory / "config.yaml"), recording, named)
 
 
 def _frames(arrays: Arrays) -> tuple[RecordedFrame, ...]:
