@@ -10,9 +10,9 @@ from loop.segmentation.build import build_segmenter
 from loop.segmentation.checkpoint import SHIPPED, read_tensors
 from loop.segmentation.evaluation import confusion_matrix, evaluate, score
 from loop.segmentation.onnx import load_graph
-from loop.segmentation.photos import Photo, read_photo, read_photos
-from loop.segmentation.self_training import Teacher, label_folder
-from loop.segmentation.training import class_weights, learning_rate, photos_by_class, train
+from loop.segmentation.photos import Photo, read_photo
+from loop.segmentation.self_training import Teacher, teach
+from loop.segmentation.training import class_weights, learning_rate, photos_by_class, soft_cross_entropy, train
 from loop.segmentation.training_log import read_log
 from semslam.config import load_config
 from semslam.errors import ConfigError, DatasetError, ModelError
@@ -91,23 +91,36 @@ def test_other_settings_do_not_resume(rooms, tmp_path):
         train(rooms, settings(epochs=3), tmp_path / "run")
 
 
-def test_teacher_labels_train_on(rooms, tmp_path):
+def test_teacher_tells_what_it_believes(rooms, tmp_path):
     teacher = Teacher([load_graph(None, "int8")], sizes=((64, 48), (96, 64)))
     probabilities = teacher.probabilities(read_photo(rooms, "0").color)
     assert probabilities.shape == (16, 24, 40)
     np.testing.assert_allclose(probabilities.sum(axis=2), 1.0, atol=1e-5)
-    label_folder(teacher, rooms / "rgb", tmp_path / "pseudo", min_confidence=0.2)
-    photos = read_photos(tmp_path / "pseudo", "train.txt")
-    assert len(photos) == 6
-    assert all((photo.labels == teacher.label(photo.color, 0.2)).all() for photo in photos)
+    photo = teach(teacher, rooms / "rgb", tmp_path / "taught")[0]
+    assert photo.beliefs.shape == (1 + 16 * 24, 40)
+    assert not photo.beliefs[0].any()
+    under_first_column = photo.beliefs[photo.cells[3::6, 2]] / 255.0
+    np.testing.assert_allclose(under_first_column, probabilities[:, 0], atol=0.01)
 
 
-def test_training_lets_teachers_label_first(rooms, tmp_path):
-    taught = settings(epochs=1, unlabelled=str(rooms / "rgb"), teachers=[str(SHIPPED)], teacher_confidence=0.2)
+def test_training_asks_teachers_once(rooms, tmp_path):
+    taught = settings(epochs=1, unlabelled=str(rooms / "rgb"), teachers=[str(SHIPPED)], unlabelled_share=0.9)
     assert train(rooms, taught, tmp_path / "run").exists()
-    assert len(read_photos(tmp_path / "run" / "taught", "train.txt")) == 6
+    kept = sorted((tmp_path / "run" / "taught").iterdir())
+    assert [path.name for path in kept] == [f"{i}.npy" for i in range(6)]
     with pytest.raises(ConfigError, match="needs both"):
         train(rooms, settings(unlabelled=str(rooms / "rgb")), tmp_path / "other")
+
+
+def test_soft_cross_entropy_of_labels_is_the_weighted_one():
+    rng = np.random.default_rng(0)
+    logits = torch.from_numpy(rng.normal(size=(2, 40, 3, 4)))
+    labels = torch.from_numpy(rng.integers(0, 40, (2, 3, 4)))
+    weights = torch.from_numpy(rng.uniform(0.3, 4.0, 40))
+    targets = (torch.nn.functional.one_hot(labels, 40) * weights).permute(0, 3, 1, 2)
+    expected = torch.nn.functional.cross_entropy(logits, labels, weight=weights)
+    torch.testing.assert_close(soft_cross_entropy(logits, targets), expected)
+    assert soft_cross_entropy(logits, torch.zeros_like(targets)) == 0
 
 
 @pytest.mark.parametrize(
@@ -129,7 +142,7 @@ def test_faulty_folder_is_one_sentence(rooms, tmp_path, damage, word):
 
 def test_views_are_drawn_from_the_seed(rooms):
     photo = read_photo(rooms, "0")
-    a, b, c = (random_view(photo, 64, 48, np.random.default_rng(seed)) for seed in (1, 1, 2))
+    a, b, c = (random_view(photo.color, photo.labels, (64, 48), np.random.default_rng(seed)) for seed in (1, 1, 2))
     assert np.array_equal(a[0], b[0])
     assert np.array_equal(a[1], b[1])
     assert not np.array_equal(a[0], c[0])
@@ -142,7 +155,7 @@ def test_views_keep_labels_on_their_pixels(strong_share):
     labels[:, 64:] = 2
     color = np.where(labels[..., None] == 2, 230, 20).repeat(3, 2).astype(np.uint8)
     for seed in range(40):
-        view, drawn = random_view(Photo("x", color, labels), 64, 48, np.random.default_rng(seed), strong_share)
+        view, drawn = random_view(color, labels, (64, 48), np.random.default_rng(seed), strong_share)
         assert view.shape == (48, 64, 3)
         inner = cv2.erode((drawn == 2).astype(np.uint8), np.ones((15, 15))) > 0
         outer = cv2.erode((drawn == 1).astype(np.uint8), np.ones((15, 15))) > 0

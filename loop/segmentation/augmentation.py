@@ -1,13 +1,16 @@
 """Random views of a labelled photo: what a hand-held camera does to an image that a photographer would not take."""
 
 from dataclasses import dataclass
+from typing import TypeVar
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 
-from loop.segmentation.photos import Photo, UInt8Array
+from loop.segmentation.photos import UInt8Array
 from semslam.geometry import Float32Array, FloatArray
 
+Label = TypeVar("Label", np.uint8, np.uint16)
 GREY = (127, 127, 127)
 PLAIN_LOG_ZOOM = (-0.22, 0.69)
 PLAIN_ROLL = 5.0
@@ -17,32 +20,32 @@ HALF = 0.6
 
 
 def random_view(
-    photo: Photo, width: int, height: int, rng: np.random.Generator, strong_share: float = 0.0
-) -> tuple[UInt8Array, UInt8Array]:
+    color: UInt8Array, labels: npt.NDArray[Label], size: tuple[int, int], rng: np.random.Generator,
+    strong_share: float = 0.0,
+) -> tuple[UInt8Array, npt.NDArray[Label]]:  # fmt: skip
     """Draw a view: zoomed, mirrored, cropped and a little relit; or a strong one, as from a hand in motion.
 
     Args:
-        photo: what is looked at.
-        width: of the view in pixels.
-        height: of the view in pixels.
+        color: (H, W, 3) RGB photo.
+        labels: (H, W) of whatever the pixels are to be told apart by.
+        size: width and height of the view in pixels.
         rng: draws everything.
         strong_share: share of views that are taken from close by or turned, badly lit, blurred and noisy.
 
     Returns:
         Colour (height, width, 3) and labels (height, width), 0 where the view leaves the photo.
     """
-    color, labels = photo.color, photo.labels
     strong = bool(rng.random() < strong_share)
     placement = _strong_placement(rng) if strong else _plain_placement(rng)
-    matrix, scale = placement.map_of(color.shape[1], color.shape[0], width, height, rng)
-    view_labels = cv2.warpAffine(labels, matrix, (width, height), flags=cv2.INTER_NEAREST, borderValue=0)
+    matrix, scale = placement.map_of(color.shape[1], color.shape[0], *size, rng)
+    view_labels = cv2.warpAffine(labels, matrix, size, flags=cv2.INTER_NEAREST, borderValue=0)
     if scale < HALF:  # bilinear sampling of a photo more than half as large again would alias
         color = cv2.resize(color, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA).astype(np.uint8)
         matrix = matrix * np.array([2.0, 2.0, 1.0])
-    view = cv2.warpAffine(color, matrix, (width, height), flags=cv2.INTER_LINEAR, borderValue=GREY)
+    view = cv2.warpAffine(color, matrix, size, flags=cv2.INTER_LINEAR, borderValue=GREY)
     light = _relight(view.astype(np.float32), rng, 1.0 if strong else PLAIN_LIGHT)
     lit = _degrade(light, rng) if strong else np.clip(np.round(light), 0, 255).astype(np.uint8)
-    return lit, view_labels.astype(np.uint8)
+    return lit, view_labels.astype(labels.dtype, copy=False)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,11 +1,16 @@
-"""Labels for photos that have none, made by trained networks (self-training)."""
+"""Teaching with photos that have no labels: trained networks say what they believe of them (self-training).
 
-import shutil
+Beliefs are kept as probabilities, since a label made of them would drop the rarer classes, of which no network is
+ever sure (Hinton et al., Distilling the knowledge in a neural network, 2015).
+"""
+
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 import onnxruntime
 
 from loop.segmentation.decoding import shrink
@@ -43,13 +48,6 @@ class Teacher:
             total += cv2.resize(plain + mirrored, (width, height))
         return total / np.float32(2 * len(self._sessions))
 
-    def label(self, color: UInt8Array, min_confidence: float) -> UInt8Array:
-        """Labels (H, W) of an RGB image, void where the teacher is less sure than ``min_confidence``."""
-        height, width = color.shape[:2]
-        enlarged = cv2.resize(self.probabilities(color), (width, height))
-        labels = enlarged.argmax(axis=2).astype(np.uint8) + 1
-        return np.where(enlarged.max(axis=2) < min_confidence, np.uint8(0), labels).astype(np.uint8)
-
 
 def _softmax(session: onnxruntime.InferenceSession, image: UInt8Array) -> Float32Array:
     logits = np.asarray(session.run(["logits"], {"image": image[None]})[0])[0].transpose(1, 2, 0)
@@ -57,14 +55,25 @@ def _softmax(session: onnxruntime.InferenceSession, image: UInt8Array) -> Float3
     return np.ascontiguousarray(exponentials / exponentials.sum(axis=2, keepdims=True), dtype=np.float32)
 
 
-def label_folder(
-    teacher: Teacher,
-    photos: Path,
-    out: Path,
-    min_confidence: float = 0.5,
-    report: Callable[[int, int], None] = lambda _done, _total: None,
-) -> None:
-    """Write a folder in the NYUv2 layout from unlabelled photos.
+@dataclass(frozen=True, slots=True, eq=False)
+class TaughtPhoto:
+    """A photo and what the teacher believes of it.
+
+    Attributes:
+        color: (H, W, 3) uint8 RGB.
+        cells: (H, W) uint16, rows of ``beliefs``.
+        beliefs: (1 + cells, 40) uint8, class probabilities in 255ths; row 0, for what lies outside, holds none.
+    """
+
+    color: UInt8Array
+    cells: npt.NDArray[np.uint16]
+    beliefs: UInt8Array
+
+
+def teach(
+    teacher: Teacher, photos: Path, folder: Path, report: Callable[[int, int], None] = lambda _done, _total: None
+) -> list[TaughtPhoto]:
+    """Ask the teacher about every photo of a folder; what it answered once is kept in ``folder``.
 
     Raises:
         DatasetError: ``photos`` holds no JPEG or PNG image.
@@ -72,11 +81,23 @@ def label_folder(
     paths = sorted(p for p in photos.iterdir() if p.suffix in {".jpg", ".png"}) if photos.is_dir() else []
     if not paths:
         raise DatasetError(f"There are no photos in {photos}.")
-    for folder in ("rgb", "labels40"):
-        (out / folder).mkdir(parents=True, exist_ok=True)
+    folder.mkdir(parents=True, exist_ok=True)
+    taught = []
     for i, path in enumerate(paths):
-        labels = teacher.label(read_color(path), min_confidence)
-        cv2.imwrite(str(out / "labels40" / f"{path.stem}.png"), labels)
-        shutil.copyfile(path, out / "rgb" / path.name)
+        color, kept = read_color(path), folder / f"{path.stem}.npy"
+        if not kept.exists():
+            probabilities = teacher.probabilities(color)
+            unfinished = folder / "unfinished.npy"
+            np.save(unfinished, np.round(probabilities * 255.0).astype(np.uint8))
+            unfinished.replace(kept)
+        taught.append(_taught(color, np.load(kept)))
         report(i + 1, len(paths))
-    (out / "train.txt").write_text("\n".join(p.stem for p in paths) + "\n", encoding="utf-8")
+    return taught
+
+
+def _taught(color: UInt8Array, beliefs: UInt8Array) -> TaughtPhoto:
+    height, width, classes = beliefs.shape
+    cells = np.arange(1, 1 + height * width, dtype=np.uint16).reshape(height, width)
+    enlarged = cv2.resize(cells, (color.shape[1], color.shape[0]), interpolation=cv2.INTER_NEAREST)
+    rows = np.vstack([np.zeros((1, classes), np.uint8), beliefs.reshape(-1, classes)])
+    return TaughtPhoto(color, enlarged.astype(np.uint16), rows)

@@ -19,14 +19,15 @@ from loop.segmentation.decoding import input_size, shrink
 from loop.segmentation.export import write_int8
 from loop.segmentation.network import DeepLab, build_mobilenet_deeplab
 from loop.segmentation.onnx import load_graph
-from loop.segmentation.photos import Photo, read_photos
+from loop.segmentation.photos import Photo, UInt8Array, read_photos
 from loop.segmentation.pretrained import convert_ade20k, refresh_norms
-from loop.segmentation.self_training import Teacher, label_folder
+from loop.segmentation.self_training import TaughtPhoto, Teacher, teach
 from loop.segmentation.training_log import plot_log, write_row
 from semslam.config import Config, TrainingConfig
 from semslam.errors import ConfigError, ModelError
+from semslam.geometry import Float32Array
 
-LOSS_STRIDE = 4
+UNDER_ANSWERS = (slice(2, None, 4), slice(2, None, 4))
 LOG_STEPS = 20
 CALIBRATION_STRIDE = 6
 NORM_IMAGES = 16
@@ -76,16 +77,16 @@ def train(directory: Path, config: Config, out: Path, report: Callable[[Progress
     return run.finish()
 
 
-def class_weights(photos: list[Photo]) -> Tensor:
+def class_weights(photos: list[Photo]) -> Float32Array:
     """Weights (40,) that fall with the square root of a class's share of pixels, clipped, median 1."""
     counts = np.sum([np.bincount(p.labels.ravel(), minlength=CLASS_COUNT + 1)[1:] for p in photos], axis=0)
     weights = 1.0 / np.sqrt(np.maximum(counts / counts.sum(), 1e-4))
     weights = weights / np.median(weights[counts > 0])
-    return torch.tensor(np.clip(weights, *WEIGHT_LIMITS), dtype=torch.float32)
+    return np.asarray(np.clip(weights, *WEIGHT_LIMITS), dtype=np.float32)
 
 
-def taught_photos(settings: TrainingConfig, folder: Path) -> list[Photo]:
-    """The unlabelled photos with the teachers' labels, made once and kept in ``folder``; none without teachers.
+def taught_photos(settings: TrainingConfig, folder: Path) -> list[TaughtPhoto]:
+    """The unlabelled photos with the teachers' beliefs, kept in ``folder``; none without teachers.
 
     Raises:
         ConfigError: there are photos without teachers, or teachers without photos.
@@ -96,10 +97,8 @@ def taught_photos(settings: TrainingConfig, folder: Path) -> list[Photo]:
         raise ConfigError("Self-training needs both 'training.unlabelled' and 'training.teachers'.")
     if settings.unlabelled is None:
         return []
-    if not (folder / "train.txt").exists():
-        teacher = Teacher([load_graph(path, "float32") for path in settings.teachers], threads=settings.threads)
-        label_folder(teacher, settings.unlabelled, folder, settings.teacher_confidence)
-    return read_photos(folder, "train.txt")
+    graphs = [load_graph(path, "float32") for path in settings.teachers]
+    return teach(Teacher(graphs, threads=settings.threads), settings.unlabelled, folder)
 
 
 def photos_by_class(photos: list[Photo]) -> list[list[Photo]]:
@@ -129,7 +128,9 @@ class _Run:
         self.taught = taught_photos(settings, out / "taught")
         self.steps = max(1, settings.epochs * len(self.photos) // settings.batch)
         self.step = 0
-        self.weights = class_weights(self.photos)
+        self.target_of_label = np.vstack([np.zeros(CLASS_COUNT), np.diag(class_weights(self.photos))]).astype(
+            np.float32
+        )
         torch.manual_seed(self.seed)
         self.network = build_mobilenet_deeplab()
         if settings.start is not None:
@@ -154,20 +155,28 @@ class _Run:
             load_weights(self.network, path)
 
     def _batch(self, rng: np.random.Generator, count: int) -> tuple[Tensor, Tensor]:
-        """Views (B, 3, H, W) in -1..1 and class indices (B, H, W), -1 = void."""
-        views, labels = [], []
+        """Views (B, 3, H, W) in -1..1 and targets (B, 40, H/4, W/4): a weight for each class, all 0 where void."""
+        views, targets = [], []
         for _ in range(count):
-            view, label = random_view(self._draw(rng), *self.size, rng, self.settings.strong_share)
+            view, target = self._draw(rng)
             views.append(view)
-            labels.append(label)
+            targets.append(target)
         images = torch.from_numpy(np.stack(views)).permute(0, 3, 1, 2).float() / 127.5 - 1.0
-        return images, torch.from_numpy(np.stack(labels).astype(np.int64)) - 1
+        return images, torch.from_numpy(np.stack(targets)).permute(0, 3, 1, 2)
 
-    def _draw(self, rng: np.random.Generator) -> Photo:
-        pool = self.taught if self.taught and rng.random() < self.settings.unlabelled_share else self.photos
-        if pool is self.photos and rng.random() < self.settings.rare_share:
+    def _draw(self, rng: np.random.Generator) -> tuple[UInt8Array, Float32Array]:
+        """A view (H, W, 3) and its target (H/4, W/4, 40)."""
+        settings = self.settings
+        if self.taught and rng.random() < settings.unlabelled_share:
+            chosen = self.taught[int(rng.integers(len(self.taught)))]
+            view, cells = random_view(chosen.color, chosen.cells, self.size, rng, settings.strong_share)
+            return view, chosen.beliefs[cells[UNDER_ANSWERS]].astype(np.float32) / np.float32(255.0)
+        pool = self.photos
+        if rng.random() < settings.rare_share:
             pool = self.by_class[int(rng.integers(len(self.by_class)))]
-        return pool[int(rng.integers(len(pool)))]
+        photo = pool[int(rng.integers(len(pool)))]
+        view, labels = random_view(photo.color, photo.labels, self.size, rng, settings.strong_share)
+        return view, self.target_of_label[labels[UNDER_ANSWERS]]
 
     def advance(self) -> float:
         """One step of the optimiser, whose views depend on seed and step alone; returns its loss."""
@@ -175,14 +184,13 @@ class _Run:
         for group in self.optimizer.param_groups:
             group["lr"] = group["peak"] * share
         torch.manual_seed(self.seed * 1_000_003 + self.step)
-        images, labels = self._batch(np.random.default_rng((self.seed, 1, self.step)), self.settings.batch)
+        images, targets = self._batch(np.random.default_rng((self.seed, 1, self.step)), self.settings.batch)
         self.network.train()
         for layer in self.frozen:
             layer.eval()
         with _mixed_precision():
             logits, _ = self.network(images.contiguous(memory_format=torch.channels_last))
-        target = labels[:, LOSS_STRIDE // 2 :: LOSS_STRIDE, LOSS_STRIDE // 2 :: LOSS_STRIDE]
-        loss = _weighted_loss(logits.float(), target, self.weights)
+        loss = soft_cross_entropy(logits.float(), targets)
         self.optimizer.zero_grad(set_to_none=True)
         loss.backward()  # type: ignore[no-untyped-call]
         torch.nn.utils.clip_grad_norm_(self.network.parameters(), 5.0)
@@ -251,10 +259,9 @@ class _Run:
             raise ModelError(f"The training in {self.out} was begun with other settings; choose another folder.")
 
 
-def _weighted_loss(logits: Tensor, target: Tensor, weights: Tensor) -> Tensor:
-    """Weighted mean cross-entropy over the pixels that are not void; 0 where all are."""
-    total = weights[target[target >= 0]].sum().clamp(min=1e-6)
-    return F.cross_entropy(logits, target, weight=weights, ignore_index=-1, reduction="sum") / total
+def soft_cross_entropy(logits: Tensor, targets: Tensor) -> Tensor:
+    """Cross-entropy of logits (B, C, h, w) with class weights of the same shape, by their sum; 0 where all are void."""
+    return -(F.log_softmax(logits, 1) * targets).sum() / targets.sum().clamp(min=1e-6)
 
 
 def _optimizer(network: DeepLab, settings: TrainingConfig) -> torch.optim.AdamW:
