@@ -7,6 +7,7 @@ import numpy as np
 
 from eval.loop_truth import DepthView, find_loop_truth, make_view
 from eval.precision_recall import Contestant, Curve, DetectorQuality, collect_scores, curve_of, judge_detector
+from eval.reliability import ScoreBin, reliability_of
 from frontend.keyframes import make_keyframe
 from loop.detector import LoopDetector
 from loop.segmentation.build import build_segmenter
@@ -28,10 +29,12 @@ class DetectorComparison:
     Attributes:
         qualities: figures, in the order of the names.
         curves: precision and recall by detector.
+        reliabilities: share of true pairs by score, by detector.
     """
 
     qualities: tuple[DetectorQuality, ...]
     curves: dict[str, Curve]
+    reliabilities: dict[str, tuple[ScoreBin, ...]]
 
 
 def compare_detectors(
@@ -66,7 +69,11 @@ def compare_detectors(
     answers = collect_scores(contestants, watched())
     truth = find_loop_truth(stamps, depths, dataset.ground_truth, config.loops.min_gap)
     qualities = tuple(judge_detector(name, answers[name], truth) for name in names)
-    return DetectorComparison(qualities, {name: curve_of(answers[name].scores, truth) for name in names})
+    return DetectorComparison(
+        qualities,
+        {name: curve_of(answers[name].scores, truth) for name in names},
+        {name: reliability_of(answers[name].scores, truth) for name in names},
+    )
 
 
 def keyframe_views(

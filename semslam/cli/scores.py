@@ -16,6 +16,8 @@ from semslam.errors import ConfigError
 if TYPE_CHECKING:
     from semslam.pair_trial import PairTrial
 
+PROBABILISTIC = "fused"
+"""The detector whose score is a probability."""
 GROUPS = ("viewpoint", "illumination", "objects")
 
 
@@ -59,6 +61,7 @@ def loops_command(
 ) -> None:
     """Score loop detectors on a sequence by precision and recall."""
     from eval.precision_recall import draw_curves
+    from eval.reliability import draw_reliability
     from semslam.datasets import open_dataset
     from semslam.experiments import compare_detectors
     from semslam.results import write_json, writing
@@ -74,6 +77,11 @@ def loops_command(
     with writing(out_directory / "precision_recall.png"):
         title = f"{dataset.name}, every {every}. frame"
         (out_directory / "precision_recall.png").write_bytes(draw_curves(comparison.curves, title))
+    if PROBABILISTIC in names:
+        with writing(out_directory / "reliability.png"):
+            title = f"{dataset.name}: probability by {PROBABILISTIC}"
+            bins = comparison.reliabilities[PROBABILISTIC]
+            (out_directory / "reliability.png").write_bytes(draw_reliability(bins, title))
     table = Table(title=f"{dataset.name}, every {every}. frame a keyframe", title_justify="left")
     table.add_column("detector")
     for heading in ("AP", "recall at 100 %", "recall at 99 %", "max F1", "recall@1", "ms"):
