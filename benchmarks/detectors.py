@@ -1,46 +1,74 @@
-"""How well each loop detector tells true loops from wrong places, and what is left after the verification.
+"""How well each loop detector tells true loops from wrong places, in other light too, and what verification leaves.
 
-    python benchmarks/detectors.py SEQUENCE... --detectors fused,dbow,conv3 --every 5
+    python benchmarks/detectors.py SEQUENCE... --detectors fused,dbow,conv3 --parts precision,calibration
 
-Prints two Markdown tables for each sequence: precision and recall over all pairs of keyframes, and how many queries
-with a true past loop get a pose within 0.20 m and 10 degrees from the detector's few candidates.
+Prints Markdown tables. Parts:
+
+- precision: precision and recall over all pairs of keyframes that view overlap decides;
+- calibration: of the probability that "fused" gives, against the share of true pairs;
+- changes: a keyframe under other light or without an object against its neighbours, at the threshold that 1 % of the
+  unchanged wrong pairs reach;
+- verified: how many queries with a true past loop get a pose within 0.20 m and 10 degrees from the few candidates;
+- mixed: the same candidates with the keyframes of all sequences in one database; a loop across is a wrong place;
+- speed: processor time of "fused" with 200 and 5000 keyframes.
 """
 
 import argparse
 import platform
-from pathlib import Path
+from dataclasses import replace
+from itertools import islice
+from time import process_time
 
 import numpy as np
 
-from eval.loop_truth import find_loop_truth, make_view
+from eval.changes import Change, change_frame
+from eval.loop_truth import TRUE_OVERLAP, find_loop_truth, make_view
+from eval.reliability import calibration_error
 from eval.trajectory import poses_at
+from frontend.keyframes import make_keyframe
+from loop.segmentation.build import build_segmenter
 from loop.verification import IcpVerifier
 from semslam import plugins
 from semslam.config import Config
 from semslam.datasets import open_dataset
 from semslam.datasets.dataset import Dataset
-from semslam.experiments import compare_detectors, keyframe_views
+from semslam.experiments import compare_detectors, exhaustive_detector, keyframe_views
+from semslam.features import FeatureExtractor
 from semslam.geometry import invert, rotation_angle
-from semslam.types import FloatArray, LoopConstraint
+from semslam.types import FloatArray, Frame, KeyframeView, LoopConstraint
 
 NAMES = "fused,semantic,semantic-paper,dbow,sda,cnnw,conv3,thumbnail,hog,gist"
+PARTS = "precision,calibration,changes,verified,mixed,speed"
+LATER = 1000.0
+"""Seconds between one sequence and the next in a common database, or between a sequence and a changed query."""
+CHANGED_STEP = 3
+"""Every third keyframe is changed."""
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("sequences", nargs="+", type=Path)
+    parser.add_argument("sequences", nargs="+")
     parser.add_argument("--detectors", default=NAMES)
+    parser.add_argument("--parts", default=PARTS)
     parser.add_argument("--every", type=int, default=5, help="frames from one keyframe to the next")
     args = parser.parse_args()
+    parts, names = args.parts.split(","), args.detectors.split(",")
     print(f"{platform.processor() or platform.machine()}, every {args.every}th frame a keyframe\n")
-    for path in args.sequences:
-        dataset = open_dataset(path)
-        names = args.detectors.split(",")
-        print_precision(dataset, names, args.every)
-        print_verified(dataset, names, args.every)
+    datasets = [open_dataset(path) for path in args.sequences]
+    for dataset in datasets:
+        if {"precision", "calibration"} & set(parts):
+            print_precision(dataset, names, args.every, "calibration" in parts)
+        if "changes" in parts:
+            print_changes(dataset, names, args.every)
+        if "verified" in parts:
+            print_verified(dataset, names, args.every)
+    if "mixed" in parts:
+        print_mixed(datasets, names, args.every)
+    if "speed" in parts:
+        print_speed(datasets[0], args.every)
 
 
-def print_precision(dataset: Dataset, names: list[str], every: int) -> None:
+def print_precision(dataset: Dataset, names: list[str], every: int, calibration: bool) -> None:
     comparison = compare_detectors(dataset, Config(), names, every)
     first = comparison.qualities[0]
     print(f"{dataset.name}: {first.true_pairs} true, {first.false_pairs} false pairs\n")
@@ -50,6 +78,111 @@ def print_precision(dataset: Dataset, names: list[str], every: int) -> None:
         figures = (q.average_precision, q.recall_at_99_precision, q.recall_at_100_precision, q.max_f1, q.recall_at_1)
         print(f"| {q.detector} | " + " | ".join(f"{x:.3f}" for x in figures) + f" | {q.ms_per_query:.1f} |", flush=True)
     print()
+    if calibration and "fused" in names:
+        bins = comparison.reliabilities["fused"]
+        print("| probability by `fused` | pairs | mean probability | share true |\n|---|---|---|---|")
+        for part in bins:
+            print(
+                f"| {part.low:.1f} to {part.high:.1f} | {part.pairs} | {part.mean_score:.2f} | {part.share_true:.2f} |"
+            )
+        print(f"\nCalibration error {calibration_error(bins):.3f}")
+        print()
+
+
+def print_changes(dataset: Dataset, names: list[str], every: int) -> None:
+    """Acceptance of changed keyframes against their unchanged neighbours."""
+    config = Config()
+    assert dataset.ground_truth is not None
+    views = list(keyframe_views(dataset, config, every, True))
+    stamps = [view.keyframe.timestamp for view in views]
+    depths = [make_view(view.depth, view.keyframe.intrinsics) for view in views]
+    truth = find_loop_truth(stamps, depths, dataset.ground_truth, min_gap=0.0)
+    wrong = replace(truth, min_gap=config.loops.min_gap).false_pairs
+    wrong |= wrong.T
+    near = np.minimum(truth.overlap, truth.overlap.T) >= TRUE_OVERLAP
+    detectors = {name: exhaustive_detector(name, config, len(views)) for name in names}
+    for view in views:
+        for detector in detectors.values():
+            detector.add(view)
+    segmenter, extractor = build_segmenter(config), FeatureExtractor(config.features)
+    thresholds = {name: [] for name in names}
+    accepted: dict[tuple[str, Change], list[float]] = {}
+    for row in range(0, len(views), CHANGED_STEP):
+        beside = [at for at in (row - 1, row + 1) if 0 <= at < len(views) and near[row, at]]
+        frame = Frame(row, stamps[row] + LATER, views[row].color, views[row].depth, views[row].keyframe.intrinsics)
+        for change in Change:
+            changed = change_frame(frame, change, row)
+            if change is not Change.NONE and changed is frame:
+                continue
+            features = extractor.extract(changed)
+            keyframe = make_keyframe(
+                len(views), changed, views[row].keyframe.T_odom_cam, 0, features, config.keyframes
+            )  # fmt: skip
+            labels = segmenter.segment(changed.color)
+            query = KeyframeView(keyframe, changed.color, changed.depth, labels)
+            for name, detector in detectors.items():
+                scores = np.zeros(len(views))
+                for candidate in detector.query(query):
+                    scores[candidate.match] = candidate.score
+                if change is Change.NONE:
+                    thresholds[name] += scores[wrong[row]].tolist()
+                else:
+                    accepted.setdefault((name, change), []).extend(scores[beside].tolist())
+    changes = [change for change in Change if change is not Change.NONE]
+    print(f"{dataset.name}: share accepted at 1 % of the wrong pairs\n")
+    print("| detector | " + " | ".join(changes) + " |\n|---|" + "---|" * len(changes))
+    for name in names:
+        limit = np.quantile(thresholds[name], 0.99)
+        shares = [float(np.mean(np.array(accepted.get((name, change), [np.nan])) > limit)) for change in changes]
+        print(f"| {name} | " + " | ".join(f"{share:.3f}" for share in shares) + " |", flush=True)
+    print()
+
+
+def print_mixed(datasets: list[Dataset], names: list[str], every: int) -> None:
+    """All sequences in one database, each long after the one before; loops across are wrong places."""
+    config = Config()
+    views: list[KeyframeView] = []
+    origin: list[int] = []
+    for number, dataset in enumerate(datasets):
+        for view in keyframe_views(dataset, config, every, True):
+            stamp = view.keyframe.timestamp - dataset.timestamps[0] + LATER * number
+            keyframe = replace(view.keyframe, id=len(views), timestamp=stamp)
+            views.append(replace(view, keyframe=keyframe))
+            origin.append(number)
+    verifier = IcpVerifier.from_config(config)
+    print(f"{', '.join(d.name for d in datasets)} in one database\n")
+    print("| detector | proposed across | accepted across |\n|---|---|---|")
+    for name in names:
+        detector = plugins.load("semslam.detectors", name).from_config(config)
+        proposed, accepted = 0, 0
+        for row, view in enumerate(views):
+            for candidate in detector.query(view):
+                if origin[candidate.match] != origin[row]:
+                    proposed += 1
+                    outcome = verifier.verify(view.keyframe, views[candidate.match].keyframe, candidate)
+                    accepted += isinstance(outcome, LoopConstraint)
+            detector.add(view)
+        print(f"| {name} | {proposed} | {accepted} |", flush=True)
+    print()
+
+
+def print_speed(dataset: Dataset, every: int) -> None:
+    """Processor milliseconds of a query of "fused" against databases of real keyframes that are entered repeatedly."""
+    views = list(islice(keyframe_views(dataset, Config(), every, True), 100))
+    detector = plugins.load("semslam.detectors", "fused").from_config(Config())
+    print("| keyframes | ms a query (median, processor time), description included |\n|---|---|")
+    for number in range(5000):
+        view = views[number % len(views)]
+        keyframe = replace(view.keyframe, id=number, timestamp=float(number))
+        detector.add(replace(view, keyframe=keyframe))
+        if number + 1 in {200, 5000}:
+            spent = []
+            for view in views[:40]:
+                query = replace(view, keyframe=replace(view.keyframe, id=9999, timestamp=9999.0))
+                start = process_time()
+                detector.query(query)
+                spent.append(1000 * (process_time() - start))
+            print(f"| {number + 1} | {np.median(spent):.1f} |", flush=True)
 
 
 def print_verified(dataset: Dataset, names: list[str], every: int) -> None:
