@@ -103,7 +103,7 @@ def pairs_command(
     ] = None,
     detectors: Annotated[
         str, typer.Option("--detectors", help="Names joined by commas.")
-    ] = "semantic-paper,semantic,fused,dbow,cnnw",
+    ] = "semantic-paper,semantic,fused,sda,dbow,cnnw,conv3",
     every: Annotated[int, typer.Option(min=1, help="Frames from one that may be chosen to the next.")] = 5,
     count: Annotated[int, typer.Option(min=2, help="Pairs of each group and sequence at the most.")] = 50,
     out_directory: Annotated[Path, typer.Option("--out", help="Folder for the results.")] = Path("pairs"),
