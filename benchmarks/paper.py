@@ -3,8 +3,9 @@
     semslam download fr1/room DATA    (and fr2/large_with_loop, fr3/long_office_household)
     python benchmarks/paper.py DATA --out paper-results
 
-For each sequence of paper.yaml: precision-recall curves (Figure 13) and a run with each detector; then the pair test over all of them (Table 2), each sequence at the threshold that is best on the others. The
-results are in the usual files: loops.json, compare.json, pairs.json.
+For each sequence of paper.yaml: precision-recall curves (Figure 13) and a run with each detector; then the pair test
+over all of them (Table 2), each sequence at the threshold that is best on the others. The results are in the usual
+files: loops.json, compare.json, pairs.json.
 """
 
 import argparse
