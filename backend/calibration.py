@@ -27,6 +27,28 @@ STEPS = 12
 """Halvings of the search for a factor."""
 NEIGHBOURHOOD = 3
 """Loops whose ends lie at most so many keyframes apart are compared with one another."""
+STRETCH = 20
+"""Keyframes of odometry that a cycle through two loops may hold on either side."""
+MAX_CYCLES = 2000
+"""Cycles that are looked at; of more, every n-th."""
+
+
+def cycle_scale(chain: OdometryChain, loops: Sequence[Edge], limit: float) -> float:
+    """Factor (1 to ``limit``) on odometry's standard deviations that closes the cycles through two loops of one way.
+
+    Such a cycle holds a stretch of odometry on either pass and nothing else. Loops between two rooms that look alike
+    close it as true ones do, so that they cannot make odometry look worse than it is.
+    """
+    queries = np.array([loop.to_key for loop in loops], dtype=np.int64)
+    matches = np.array([loop.from_key for loop in loops], dtype=np.int64)
+    first, second = np.triu_indices(len(loops), 1)
+    apart = np.maximum(np.abs(queries[first] - queries[second]), np.abs(matches[first] - matches[second]))
+    chosen = np.flatnonzero((apart > NEIGHBOURHOOD) & (apart <= STRETCH))
+    if not len(chosen):
+        return 1.0
+    chosen = chosen[:: -(-len(chosen) // MAX_CYCLES)]
+    left, own, odometry, joined = cycles(chain, loops, first[chosen], second[chosen])
+    return _smallest_scale(left[joined], own[joined], odometry[joined], limit, MEDIAN, MEDIAN_CHI2)
 
 
 def odometry_scale(chain: OdometryChain, loops: Sequence[Edge], limit: float) -> float:

@@ -14,6 +14,11 @@ SAME_PLACE_RAD = 0.35
 
 def connected_components(keys: Iterable[int], edges: Iterable[Edge]) -> list[tuple[int, ...]]:
     """Sets of keys joined by edges, each ascending; the largest first, ties by the lowest key."""
+    return connected(keys, ((edge.from_key, edge.to_key) for edge in edges))
+
+
+def connected(keys: Iterable[int], pairs: Iterable[tuple[int, int]]) -> list[tuple[int, ...]]:
+    """Sets of keys joined by pairs, in the order of ``connected_components``."""
     parent = {key: key for key in keys}
 
     def root(key: int) -> int:
@@ -22,8 +27,8 @@ def connected_components(keys: Iterable[int], edges: Iterable[Edge]) -> list[tup
             key = parent[key]
         return key
 
-    for edge in edges:
-        low, high = sorted((root(edge.from_key), root(edge.to_key)))
+    for a, b in pairs:
+        low, high = sorted((root(a), root(b)))
         parent[high] = low
     groups: dict[int, list[int]] = {}
     for key in sorted(parent):

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import gtsam
 import numpy as np
 
-from backend.calibration import loop_scale, odometry_scale
+from backend.calibration import cycle_scale, loop_scale, odometry_scale
 from backend.chain import OdometryChain
 from backend.components import connected_components, place_components
 from backend.factors import (
@@ -18,11 +18,15 @@ from backend.factors import (
     prior_factor,
     read_poses,
 )
+from backend.plausibility import Screening, screen_loops
 from backend.products import Edge, GraphSolution, LoopVerdict, loop_edge
 from backend.robust import RobustProblem, RobustSolution, solve_robustly
 from semslam.config import BackendConfig
 from semslam.geometry import invert
-from semslam.types import FloatArray, LoopConstraint
+from semslam.types import FloatArray, LoopConstraint, RejectionReason
+
+SLACK = 1.5
+"""How much farther odometry's deviations may be widened than short cycles ask for: a bias grows with the way."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,11 +77,13 @@ def optimize_graph(problem: GraphProblem, config: BackendConfig, marginals: bool
     odometry_factor, loop_factor = _scales(problem, edges, config)
     loops = [edge.widened(loop_factor) for edge in edges]
     odometry = [edge.widened(odometry_factor) for edge in problem.odometry]
+    screening = _screen(problem, odometry, loops, config)
+    eligible = [loop for loop, fit in zip(loops, screening.eligible, strict=True) if fit]
     trusted = _trusted(problem, maps, start, odometry)
-    robust = RobustProblem(trusted, odometry, loops, make_values(start), config.max_residual, config.max_iterations)
+    robust = RobustProblem(trusted, odometry, eligible, make_values(start), config.max_residual, config.max_iterations)
     result = solve_robustly(config.robust, robust)
     poses = read_poses(result.values, problem.poses)
-    verdicts = _judge(problem, result, loops, poses, config)
+    verdicts = _judge(problem, result, loops, screening, poses, config)
     accepted = np.array([verdict.accepted for verdict in verdicts], dtype=bool)
     kept = [edge for edge, good in zip(edges, accepted, strict=True) if good]
     components = connected_components(problem.poses, [*problem.odometry, *kept])
@@ -100,7 +106,17 @@ def optimize_graph(problem: GraphProblem, config: BackendConfig, marginals: bool
 def _scales(problem: GraphProblem, loops: Sequence[Edge], config: BackendConfig) -> tuple[float, float]:
     chain = OdometryChain(problem.poses, problem.odometry)
     of_loops = loop_scale(chain, loops, config.max_loop_scale)
-    return odometry_scale(chain, [loop.widened(of_loops) for loop in loops], config.max_odometry_scale), of_loops
+    widened = [loop.widened(of_loops) for loop in loops]
+    believable = SLACK * cycle_scale(chain, widened, config.max_odometry_scale)
+    return odometry_scale(chain, widened, min(believable, config.max_odometry_scale)), of_loops
+
+
+def _screen(problem: GraphProblem, odometry: Sequence[Edge], loops: Sequence[Edge], config: BackendConfig) -> Screening:
+    """Which loops may take part, and why others may not."""
+    if config.robust == "none" or config.drift_slack == 0:
+        return Screening(np.zeros(len(loops)), (None,) * len(loops))
+    chain = OdometryChain(problem.poses, odometry)
+    return screen_loops(chain, loops, config.max_residual, config.drift_slack)
 
 
 def _trusted(
@@ -119,14 +135,18 @@ def _judge(
     problem: GraphProblem,
     result: RobustSolution,
     loops: Sequence[Edge],
+    screening: Screening,
     poses: Mapping[int, FloatArray],
     config: BackendConfig,
 ) -> tuple[LoopVerdict, ...]:
-    verdicts = []
-    for constraint, edge, weight in zip(problem.constraints, loops, result.weights, strict=True):
+    verdicts, weights = [], iter(result.weights)
+    screened = zip(screening.distances.tolist(), screening.reasons, strict=True)
+    for constraint, edge, (drift, reason) in zip(problem.constraints, loops, screened, strict=True):
+        weight = 0.0 if reason else float(next(weights))
         residual = mahalanobis(edge, poses)
         accepted = config.robust == "none" or (weight > 0 and residual <= config.max_residual)
-        verdicts.append(LoopVerdict(constraint, float(weight), bool(accepted), residual))
+        why = None if accepted else reason or RejectionReason.OUTLIER
+        verdicts.append(LoopVerdict(constraint, weight, bool(accepted), residual, drift, why))
     return tuple(verdicts)
 
 

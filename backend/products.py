@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 
 from backend.checks import checked_covariance, checked_pose
-from semslam.types import FloatArray, LoopConstraint
+from semslam.types import FloatArray, LoopConstraint, RejectionReason
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,12 +51,16 @@ class LoopVerdict:
         weight: how far the graph follows it, 0..1.
         accepted: whether it is taken for true.
         residual: Mahalanobis distance between the loop and the optimised poses (6 degrees of freedom).
+        drift: Mahalanobis distance between the loop and odometry alone; 0 where that was not asked.
+        reason: why it is not accepted: it contradicts odometry, it is ambiguous, or it does not fit the others.
     """
 
     constraint: LoopConstraint
     weight: float
     accepted: bool
     residual: float
+    drift: float = 0.0
+    reason: RejectionReason | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

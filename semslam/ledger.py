@@ -124,11 +124,14 @@ class LedgerEntry:
 
 @dataclass(frozen=True, slots=True)
 class GraphVerdict:
-    """What the graph said of a verified loop, and what the loop brought where that was worked out."""
+    """What the graph said of a verified loop: what it brought, or the test it failed with its figure and limit."""
 
     weight: float
     accepted: bool
     contribution: LoopContribution | None = None
+    reason: str | None = None
+    figure: float | None = None
+    limit: float | None = None
 
 
 def rejected_entry(rejection: LoopRejection, keyframes: Sequence[Keyframe]) -> LedgerEntry:
@@ -150,7 +153,9 @@ def verified_entry(
     return LedgerEntry(
         **_identity(constraint, keyframes),
         verdict=Verdict.ACCEPTED if graph.accepted else Verdict.WITHDRAWN,
-        reason=None if graph.accepted else "outlier",
+        reason=graph.reason,
+        figure=graph.figure,
+        limit=graph.limit,
         method=constraint.method,
         inliers=constraint.inliers,
         fitness=constraint.fitness,

@@ -6,16 +6,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from backend.products import LoopVerdict
 from eval.loop_truth import JudgedLoop, LoopJudgement, judge_loops
 from eval.trajectory import TrajectoryScore, coverage, score_trajectory
-from semslam.config import Config
+from semslam.config import BackendConfig, Config
 from semslam.contributions import loop_contributions
 from semslam.datasets.dataset import Dataset
 from semslam.errors import TrajectoryError
-from semslam.ledger import GraphVerdict, LedgerEntry, Verdict, rejected_entry, verified_entry
+from semslam.ledger import GraphVerdict, LedgerEntry, LoopContribution, Verdict, rejected_entry, verified_entry
 from semslam.metrics import LoopMetrics, Metrics, TimeMetrics, TrajectoryMetrics
 from semslam.slam import FrameState, SlamResult
-from semslam.types import LoopConstraint, TrackingStatus, Trajectory
+from semslam.types import LoopConstraint, RejectionReason, TrackingStatus, Trajectory
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -108,11 +109,21 @@ def _ledger(dataset: Dataset, slam: SlamResult, config: Config) -> tuple[LedgerE
     for outcome in slam.outcomes:
         if isinstance(outcome, LoopConstraint):
             verdict, truth, contribution = next(verdicts)
-            graph = GraphVerdict(verdict.weight, verdict.accepted, contribution)
-            entries.append(verified_entry(outcome, slam.keyframes, graph, truth))
+            entries.append(
+                verified_entry(outcome, slam.keyframes, _graph_verdict(verdict, contribution, config.backend), truth)
+            )
         else:
             entries.append(rejected_entry(outcome, slam.keyframes))
     return tuple(entries)
+
+
+def _graph_verdict(verdict: LoopVerdict, contribution: LoopContribution | None, config: BackendConfig) -> GraphVerdict:
+    """The verdict with the figure that failed: the residual, or before that the distance from odometry alone."""
+    if verdict.reason is None:
+        return GraphVerdict(verdict.weight, verdict.accepted, contribution)
+    drift = (verdict.drift, config.drift_slack * config.max_residual)
+    figure, limit = (verdict.residual, config.max_residual) if verdict.reason is RejectionReason.OUTLIER else drift
+    return GraphVerdict(verdict.weight, verdict.accepted, contribution, verdict.reason.value, figure, limit)
 
 
 def _truths(dataset: Dataset, slam: SlamResult) -> Sequence[JudgedLoop | None]:
