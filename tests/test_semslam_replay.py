@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from semslam.config import Config
@@ -105,14 +105,14 @@ def test_what_cannot_be_replayed_is_one_sentence(semslam: Call, saved: Path, tmp
     (damaged / "frontend.npz").write_bytes(content[: len(content) // 2])
     shutil.copytree(saved, nameless)
     (nameless / "sequence.txt").unlink()
-    settings = tmp_path / "settings.yaml"
-    settings.write_text("seed: 1\n")
+    other = tmp_path / "settings.yaml"
+    other.write_text("seed: 1\n")
     for words, complaint in (
         (("--from", tmp_path), "has no frontend.npz"),
         (("--from", damaged), "is damaged"),
         (("--from", nameless), "does not tell where its images are"),
         (("--from", saved, "--odometry", "dense"), "'odometry' decides the front end"),
-        (("--from", saved, "--config", settings), "change them with --set"),
+        (("--from", saved, "--config", other), "change them with --set"),
         (("--from", saved, "synthetic:house?frames=30&width=160"), "not the sequence"),
         ((), "Name a sequence"),
     ):
@@ -122,6 +122,7 @@ def test_what_cannot_be_replayed_is_one_sentence(semslam: Call, saved: Path, tmp
     assert not (tmp_path / "out").exists()
 
 
+@settings(max_examples=25, deadline=None)
 @given(
     data=st.data(),
     count=st.integers(1, 6),
