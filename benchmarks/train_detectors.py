@@ -93,7 +93,7 @@ def fusion_from(folder: Path) -> None:
         for view in views:
             encoding = backbone.encode(view.color)
             photo_of.append(number)
-            pooled.append(fusion.pool(encoding.high))
+            pooled.append(fusion.pool_layers(encoding))
             bags.append(make_bag(tree, find_features(extractor, view.color).descriptors))
             classes.append(fusion.pool_classes(encoding.middle, segmenter.segment(view.color).labels, movable))
     looks = Looks(np.array(photo_of), np.array(pooled), bags, classes)

@@ -33,7 +33,11 @@ class Encoding:
 
 
 class Backbone:
-    """Runs the encoder alone; the decoder is most of the network, and not wanted here."""
+    """Runs the encoder alone; the decoder is most of the network, and not wanted here.
+
+    Attributes:
+        size: width and height of the network's input.
+    """
 
     def __init__(self, graph: bytes, size: tuple[int, int], threads: int = 1) -> None:
         try:
@@ -45,7 +49,7 @@ class Backbone:
             raise ModelError("The ONNX graph is not one that semslam exported.")
         model.graph.output.append(onnx.helper.make_tensor_value_info(self._high, onnx.TensorProto.FLOAT, None))
         self._session = open_session(model.SerializeToString(), size, threads)
-        self._size = size
+        self.size = size
         self._options = onnxruntime.RunOptions()
         self._options.only_execute_path_to_fetches = True
 
@@ -62,7 +66,7 @@ class Backbone:
 
     def encode(self, color: UInt8Array) -> Encoding:
         """Encode an RGB image (H, W, 3) uint8."""
-        image = shrink(color, self._size)
+        image = shrink(color, self.size)
         outputs = self._session.run([MIDDLE, self._high], {"image": image[None]}, self._options)
         middle, high = (np.asarray(out, dtype=np.float32)[0].transpose(1, 2, 0) for out in outputs)
         return Encoding(np.ascontiguousarray(middle), np.ascontiguousarray(high))

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Self
 
+import cv2
 import numpy as np
 
 from loop.backbone import Backbone
@@ -12,7 +13,9 @@ from loop.fusion import ClassFeatures, FusionModel, load_fusion, pool_classes
 from loop.growing import GrowingArray
 from loop.memo import LastView
 from loop.segmentation.classes import MOVABLE
+from loop.segmentation.decoding import shrink
 from loop.timeline import Timeline
+from loop.upright import roll_of, turn_image, turn_labels
 from loop.vocabulary import Vocabulary, load_vocabulary
 from loop.word_index import Bag, WordIndex
 from semslam.config import Config, FusedConfig, LoopConfig
@@ -34,14 +37,15 @@ class _Look:
 class FusedDetector:
     """The look of the whole image, its words, and the look of each class in it, joined to a probability.
 
-    - whole: the encoder's last layer, pooled to one vector by a generalised mean of its positive and negative parts
-      and projected so that what viewpoint and light change is shrunk; cosine;
+    - whole: two layers of the encoder, pooled to one vector by a generalised mean of their positive and negative
+      parts and projected so that what viewpoint and light change is shrunk; cosine;
     - words: square root of the L1 score of tf-idf bags of ORB words;
     - classes: the encoder's mid-level features averaged over each segmented class, compared class by class and
       weighed by the class's share of the image; classes that people move count less than structure.
 
-    A logistic function, learned on warped and relit photos of other places, joins the three. Some of the candidates
-    are the best by words alone: they are rarely the likeliest, and often the ones whose pose can be verified.
+    Images are turned upright by the tracked roll first. A logistic function, learned on warped and relit photos of
+    other places, joins the three. Some of the candidates are the best by words alone: they are rarely the likeliest,
+    and often the ones whose pose can be verified.
     """
 
     name = "fused"
@@ -94,11 +98,13 @@ class FusedDetector:
     def _describe(self, view: KeyframeView) -> _Look:
         if view.labels is None:
             raise ConfigError(f"The detector '{self.name}' needs a segmentation, and none came with the keyframe.")
-        encoding = self._backbone.encode(view.color)
+        roll, size = roll_of(view.keyframe.T_odom_cam), self._backbone.size
+        encoding = self._backbone.encode(turn_image(shrink(view.color, size), roll))
+        labels = turn_labels(cv2.resize(view.labels.labels, size, interpolation=cv2.INTER_NEAREST), roll)  # type: ignore[arg-type]
         movable = frozenset(i for i, name in enumerate(view.labels.names) if name in MOVABLE)
-        classes = pool_classes(encoding.middle, view.labels.labels, movable)
+        classes = pool_classes(encoding.middle, labels, movable)
         bag = make_bag(self._vocabulary, view.keyframe.features.descriptors)
-        return _Look(self._model.whole(encoding.high), bag, classes)
+        return _Look(self._model.whole(encoding), bag, classes)
 
     def _parts(self, look: _Look) -> FloatArray:
         """Scores (N, 3) of whole image, words and classes with each remembered keyframe."""

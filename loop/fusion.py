@@ -6,6 +6,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from loop.backbone import Encoding
 from loop.weight_file import open_weights
 from semslam.types import Float32Array, FloatArray, UInt8Array
 
@@ -19,8 +20,8 @@ class FusionModel:
     """What was learned of the fusion.
 
     Attributes:
-        mean: (640,) of the pooled descriptors.
-        projection: (640, D) that shrinks what changes with viewpoint and light, and keeps what tells places apart.
+        mean: (832,) of the pooled descriptors.
+        projection: (832, D) that shrinks what changes with viewpoint and light, and keeps what tells places apart.
         weights: (3,) of the whole image, the words and the classes in the logistic score.
         bias: of the logistic score.
     """
@@ -30,9 +31,9 @@ class FusionModel:
     weights: FloatArray
     bias: float
 
-    def whole(self, high: Float32Array) -> Float32Array:
-        """The image's unit descriptor (D,) from the encoder's last layer (h, w, 320)."""
-        projected = (pool(high) - self.mean) @ self.projection
+    def whole(self, encoding: Encoding) -> Float32Array:
+        """The image's unit descriptor (D,)."""
+        projected = (pool_layers(encoding) - self.mean) @ self.projection
         return np.asarray(projected / max(float(np.linalg.norm(projected)), 1e-9), dtype=np.float32)
 
     def probability(self, parts: FloatArray) -> FloatArray:
@@ -66,6 +67,11 @@ def pool(features: Float32Array) -> Float32Array:
     means = [np.maximum(sign * cubes, np.float32(0)).mean(axis=0) for sign in (1, -1)]
     pooled = np.cbrt(np.concatenate(means))
     return np.asarray(pooled / max(float(np.linalg.norm(pooled)), 1e-9), dtype=np.float32)
+
+
+def pool_layers(encoding: Encoding) -> Float32Array:
+    """Both layers of an image pooled, (832,): the last one tells rooms apart, the middle one parts of a room."""
+    return np.concatenate([pool(encoding.high), pool(encoding.middle)])
 
 
 @dataclass(frozen=True, slots=True, eq=False)

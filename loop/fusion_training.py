@@ -10,8 +10,8 @@ from loop.fusion import ClassFeatures, FusionModel
 from loop.word_index import Bag, WordIndex
 from semslam.types import Float32Array, FloatArray, IntArray
 
-DIMENSIONS = 128
-RIDGE = 0.5
+DIMENSIONS = 256
+RIDGE = 2.0
 """Share of the mean variance that is added to each direction: photos show only some of what changes."""
 FOLDS = 4
 STRANGERS = 8
@@ -26,7 +26,7 @@ class Looks:
 
     Attributes:
         photo: (N,) number of the photo that each view shows a part of.
-        pooled: (N, 640) pooled last layer.
+        pooled: (N, 832) pooled layers.
         bags: words of each view.
         classes: class features of each view.
     """
@@ -69,7 +69,7 @@ def train_fusion(looks: Looks, same: IntArray, seed: int) -> FusionModel:
 def learn_projection(
     pooled: Float32Array, pairs: IntArray, same: npt.NDArray[np.bool_]
 ) -> tuple[Float32Array, Float32Array]:
-    """Mean (D,) and projection (D, 128) by learned whitening (Mikolajczyk and Matas, ICCV 2007).
+    """Mean (D,) and projection (D, 256) by learned whitening (Mikolajczyk and Matas, ICCV 2007).
 
     Args:
         pooled: (N, D) descriptors.

@@ -1,5 +1,6 @@
 """The parts of the fused detector: pooling, class scores, the learned projection, candidates."""
 
+import cv2
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -11,8 +12,10 @@ from loop.fusion import ClassFeatures, FusionModel, load_fusion, pool, pool_clas
 from loop.fusion_training import learn_projection
 from loop.photo_views import make_view, overlap
 from loop.relighting import gamma, noise, relight, shadow, tint
+from loop.upright import roll_of, turn_image, turn_labels
 from loop.word_index import RECENT, WordIndex
 from semslam.errors import ModelError
+from semslam.geometry import exp_so3, make_transform
 
 RNG = np.random.default_rng(0)
 
@@ -110,7 +113,7 @@ def test_a_missing_or_damaged_model_is_one_sentence(tmp_path) -> None:
 
 
 def test_a_saved_model_comes_back(tmp_path) -> None:
-    model = FusionModel(np.ones(640, np.float32), np.ones((640, 4), np.float32), np.array([1.0, 2.0, 3.0]), -1.0)
+    model = FusionModel(np.ones(832, np.float32), np.ones((832, 4), np.float32), np.array([1.0, 2.0, 3.0]), -1.0)
     model.save(tmp_path / "m.npz")
     again = load_fusion(tmp_path / "m.npz")
     np.testing.assert_array_equal(again.projection, model.projection)
@@ -133,3 +136,31 @@ def test_relighting_does_what_it_says() -> None:
     assert dark[:, -5:].mean() < 0.6 * photo[:, -5:].mean()
     assert abs(float(noise(photo, 20, np.random.default_rng(0)).std()) - float(photo.std())) < 15
     assert relight(photo, np.random.default_rng(1)).shape == photo.shape
+
+
+@given(st.floats(-170, 170), st.floats(-50, 50), st.floats(-180, 180))
+@settings(max_examples=60, deadline=None)
+def test_roll_is_found_whatever_the_pan_and_tilt(roll: float, tilt: float, pan: float) -> None:
+    """Angles in degrees; y points down."""
+    axes = [
+        exp_so3(np.radians(angle) * axis) for angle, axis in zip((pan, tilt, roll), np.eye(3)[[1, 0, 2]], strict=True)
+    ]
+    pose = make_transform(axes[0] @ axes[1] @ axes[2], [1, 2, 3])
+    assert (roll_of(pose) - roll + 180) % 360 - 180 == pytest.approx(0, abs=1e-6)
+
+
+def test_looking_down_has_no_roll() -> None:
+    assert roll_of(make_transform(exp_so3([np.radians(80), 0, 0]), [0, 0, 0])) == 0
+
+
+def test_a_rolled_camera_is_turned_upright() -> None:
+    upright = cv2.GaussianBlur(RNG.integers(0, 256, (121, 161, 3), dtype=np.uint8), (0, 0), 4)
+    pose = make_transform(exp_so3([0, 0, np.radians(30)]), [0, 0, 0])
+    rolled = cv2.warpAffine(upright, cv2.getRotationMatrix2D((80, 60), 30, 1.0), (161, 121))
+    again = turn_image(rolled, roll_of(pose))
+    middle = np.s_[40:80, 60:100]
+    assert np.abs(again[middle].astype(int) - upright[middle]).mean() < 2
+    labels = turn_labels(np.ones((121, 161), np.uint8), 30.0)
+    assert labels[60, 80] == 1
+    assert labels[0, 0] == 0
+    assert turn_image(upright, 1.0) is upright
