@@ -92,7 +92,7 @@ def adjust(
         values = _adjusted(held, factors, kept, values, config.iterations)
         fresh = sightings.moved(read_poses(values, poses), values)
         errors, depths = reprojection_errors(fresh, intrinsics, config.baseline)
-        inside = (depths > 0) & (_whitened(errors, config) <= config.outlier)
+        inside = (depths > 0) & (_whitened(errors, fresh, config) <= config.outlier)
         dropped = int((kept & ~inside).sum())
         rounds.append(BundleRound(int(kept.sum()), dropped, _rmse(errors[kept & inside])))
         kept &= inside
@@ -123,15 +123,14 @@ def _observation_factors(
 ) -> list[gtsam.NonlinearFactor]:
     camera = (intrinsics.fx, intrinsics.fy, 0.0, intrinsics.cx, intrinsics.cy)
     stereo, mono = gtsam.Cal3_S2Stereo(*camera, config.baseline), gtsam.Cal3_S2(*camera)
-    pixel, disparity = config.pixel_sigma, config.pixel_sigma / np.sqrt(config.disparity_weight)
-    kernel = gtsam.noiseModel.mEstimator.Huber.Create(HUBER_K)
-    stereo_noise = gtsam.noiseModel.Robust.Create(kernel, gtsam.noiseModel.Diagonal.Sigmas([pixel, disparity, pixel]))
-    mono_noise = gtsam.noiseModel.Robust.Create(kernel, gtsam.noiseModel.Isotropic.Sigma(2, pixel))
+    noises = {sigma: _noises(sigma, config) for sigma in np.unique(sightings.sigmas).tolist()}
+    sigmas = sightings.sigmas.tolist()
     right = sightings.right_u(intrinsics, config.baseline).tolist()
     keys, landmarks = sightings.keys.tolist(), sightings.landmarks.tolist()
     factors: list[gtsam.NonlinearFactor] = []
     for i, (u, v) in enumerate(sightings.pixels.tolist()):
         point = gtsam.symbol("l", landmarks[i])
+        stereo_noise, mono_noise = noises[sigmas[i]]
         if sightings.depths[i] > 0:
             pair = gtsam.StereoPoint2(u, right[i], v)
             factors.append(gtsam.GenericStereoFactor3D(pair, stereo_noise, keys[i], point, stereo, False, False))
@@ -143,6 +142,15 @@ def _observation_factors(
     return factors
 
 
+def _noises(sigma: float, config: BundleConfig) -> tuple[gtsam.noiseModel.Robust, gtsam.noiseModel.Robust]:
+    """Noise of a stereo and of a monocular observation of a keypoint."""
+    pixel = config.pixel_sigma * sigma
+    kernel = gtsam.noiseModel.mEstimator.Huber.Create(HUBER_K)
+    stereo = gtsam.noiseModel.Diagonal.Sigmas([pixel, pixel / np.sqrt(config.disparity_weight), pixel])
+    mono = gtsam.noiseModel.Isotropic.Sigma(2, pixel)
+    return gtsam.noiseModel.Robust.Create(kernel, stereo), gtsam.noiseModel.Robust.Create(kernel, mono)
+
+
 def _pose_factors(poses: Mapping[int, FloatArray], edges: Sequence[Edge]) -> gtsam.NonlinearFactorGraph:
     graph = gtsam.NonlinearFactorGraph()
     for index, (key, T_world_cam) in enumerate(sorted(poses.items())):
@@ -152,9 +160,9 @@ def _pose_factors(poses: Mapping[int, FloatArray], edges: Sequence[Edge]) -> gts
     return graph
 
 
-def _whitened(errors: FloatArray, config: BundleConfig) -> FloatArray:
+def _whitened(errors: FloatArray, sightings: Sightings, config: BundleConfig) -> FloatArray:
     weights = np.array([1.0, 1.0, config.disparity_weight])
-    return np.asarray(np.sqrt((errors**2 * weights).sum(1)) / config.pixel_sigma)
+    return np.asarray(np.sqrt((errors**2 * weights).sum(1)) / (config.pixel_sigma * sightings.sigmas))
 
 
 def _rmse(errors: FloatArray) -> float:

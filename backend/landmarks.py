@@ -19,6 +19,7 @@ class Sightings:
         landmarks: (M,) row of its landmark in ``points``.
         pixels: (M, 2) undistorted.
         depths: (M,) metres; 0 = none.
+        sigmas: (M,) how exact each keypoint is, relative to the best.
         points: (L, 3) landmarks in the world, metres.
         local: (M, 3) the landmark in the keyframe's camera.
     """
@@ -27,6 +28,7 @@ class Sightings:
     landmarks: IntArray
     pixels: FloatArray
     depths: FloatArray
+    sigmas: FloatArray
     points: FloatArray
     local: FloatArray
 
@@ -62,6 +64,7 @@ def gather(
     pixels = np.concatenate([one.pixels for _, one in seen]).astype(np.float64)
     depths = np.concatenate([one.depths for _, one in seen]).astype(np.float64)
     depths = np.where(np.isfinite(depths), depths, 0.0)
+    sigmas = np.concatenate([np.ones(len(one.pixels)) if one.sigmas is None else one.sigmas for _, one in seen])
     usable = np.isfinite(pixels).all(1)
     _, rows = np.unique(identities, return_inverse=True)
     views = np.bincount(rows, usable)
@@ -69,10 +72,10 @@ def gather(
     good = usable & (views >= min_views)[rows] & (measured > 0)[rows]
     if not good.any():
         return _NOTHING
-    keys, pixels, depths = keys[good], pixels[good], depths[good]
+    keys, pixels, depths, sigmas = keys[good], pixels[good], depths[good], sigmas[good].astype(np.float64)
     _, rows = np.unique(identities[good], return_inverse=True)
     points = _starting_points(poses, keys, rows, pixels, depths, intrinsics)
-    return Sightings(keys, rows, pixels, depths, points, _local(poses, keys, points[rows]))
+    return Sightings(keys, rows, pixels, depths, sigmas, points, _local(poses, keys, points[rows]))
 
 
 def thinned(sightings: Sightings, wanted: int) -> Sightings:
@@ -97,6 +100,7 @@ def thinned(sightings: Sightings, wanted: int) -> Sightings:
         landmarks=(np.cumsum(kept) - 1)[sightings.landmarks[stays]],
         pixels=sightings.pixels[stays],
         depths=sightings.depths[stays],
+        sigmas=sightings.sigmas[stays],
         points=sightings.points[kept],
         local=sightings.local[stays],
     )
@@ -115,7 +119,13 @@ def reprojection_errors(sightings: Sightings, intrinsics: Intrinsics, baseline: 
 
 
 _NOTHING = Sightings(
-    np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros((0, 2)), np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3))
+    keys=np.zeros(0, np.int64),
+    landmarks=np.zeros(0, np.int64),
+    pixels=np.zeros((0, 2)),
+    depths=np.zeros(0),
+    sigmas=np.zeros(0),
+    points=np.zeros((0, 3)),
+    local=np.zeros((0, 3)),
 )
 
 

@@ -152,7 +152,9 @@ class FeatureMapOdometry:
         self._prediction.tracked(view.timestamp, invert(T_map_prev) @ found.T_map_cam)
         self._lost_since = self._usable_since = None
         features = view.features
-        seen = Observations(found.landmarks, features.pixels[found.keypoints], features.depths[found.keypoints])
+        rows = found.keypoints
+        sigmas = np.float32(self._scale) ** features.octaves[rows]
+        seen = Observations(found.landmarks, features.pixels[rows], features.depths[rows], sigmas)
         T_prev_cur = invert(self._T_reported) @ found.T_map_cam
         self._T_reported = found.T_map_cam
         self._T_ref_prev = invert(self._reference.T_map_cam) @ found.T_map_cam

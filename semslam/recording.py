@@ -125,6 +125,7 @@ def write_recording(directory: Path, recording: Recording, source: str | None = 
         landmarks=_joined([o.landmarks for o in seen], np.int64, ()),
         pixels=_joined([o.pixels for o in seen], np.float32, (2,)),
         depths=_joined([o.depths for o in seen], np.float32, ()),
+        sigmas=_joined([np.ones_like(o.depths) if o.sigmas is None else o.sigmas for o in seen], np.float32, ()),
     )
 
 
@@ -187,11 +188,11 @@ def _observations(arrays: Arrays) -> list[Observations | None]:
     """What each frame saw; None where the odometry kept nothing of it."""
     counts = arrays["observed"]
     ends = np.cumsum(counts.clip(0))
-    landmarks, pixels, depths = (arrays[name] for name in ("landmarks", "pixels", "depths"))
-    if not len(landmarks) == len(pixels) == len(depths) == ends[-1]:
+    columns = [arrays[name] for name in ("landmarks", "pixels", "depths", "sigmas")]
+    if any(len(column) != ends[-1] for column in columns):
         raise ValueError("landmarks are missing")
     return [
-        None if count < 0 else Observations(*(column[end - count : end] for column in (landmarks, pixels, depths)))
+        None if count < 0 else Observations(*(column[end - count : end] for column in columns))
         for count, end in zip(counts.tolist(), ends.tolist(), strict=True)
     ]
 

@@ -111,11 +111,13 @@ class Observations:
         landmarks: (N,) int64 landmark identities.
         pixels: (N, 2) float32, undistorted.
         depths: (N,) float32 metres; 0 = none.
+        sigmas: (N,) float32 pixels, how exact each keypoint is; None = all alike, 1 px.
     """
 
     landmarks: IntArray
     pixels: Float32Array
     depths: Float32Array
+    sigmas: Float32Array | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

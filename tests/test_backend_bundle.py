@@ -71,6 +71,20 @@ def test_noise_and_wrong_matches():
     assert result.rounds[-1].dropped < result.rounds[0].dropped / 20
 
 
+def test_keypoints_count_by_how_exact_they_are():
+    truth, points = world()
+    errors = []
+    for told in (False, True):
+        rng = np.random.default_rng(3)
+        start, seen = shaken(truth, rng), look(truth, points, rng, 0.3)
+        for key, one in seen.items():
+            sigmas = rng.choice(np.float32([1.0, 8.0]), len(one.pixels))
+            pixels = one.pixels + (rng.normal(size=one.pixels.shape) * 0.3 * sigmas[:, None]).astype(np.float32)
+            seen[key] = Observations(one.landmarks, pixels, one.depths, sigmas if told else None)
+        errors.append(error(adjust(start, seen, CAMERA, CONFIG).poses, truth))
+    assert errors[1] < 0.8 * errors[0]
+
+
 def test_the_same_input_gives_the_same_bytes():
     def once():
         truth, points = world()
