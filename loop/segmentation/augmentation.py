@@ -12,7 +12,7 @@ from semslam.geometry import Float32Array, FloatArray
 
 Label = TypeVar("Label", np.uint8, np.uint16)
 GREY = (127, 127, 127)
-PLAIN_LOG_ZOOM = (-0.22, 0.69)
+PLAIN_LOG_ZOOM = (-0.4, 0.45)
 PLAIN_ROLL = 5.0
 PLAIN_LIGHT = 0.4
 STRONG_ROLL = 45.0
