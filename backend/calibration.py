@@ -43,7 +43,7 @@ def cycle_scale(chain: OdometryChain, loops: Sequence[Edge], limit: float) -> fl
     matches = np.array([loop.from_key for loop in loops], dtype=np.int64)
     first, second = np.triu_indices(len(loops), 1)
     apart = np.maximum(np.abs(queries[first] - queries[second]), np.abs(matches[first] - matches[second]))
-    chosen = np.flatnonzero((apart > NEIGHBOURHOOD) & (apart <= STRETCH))
+    chosen = np.flatnonzero((apart > 1) & (apart <= STRETCH))
     if not len(chosen):
         return 1.0
     chosen = chosen[:: -(-len(chosen) // MAX_CYCLES)]

@@ -107,8 +107,9 @@ def _scales(problem: GraphProblem, loops: Sequence[Edge], config: BackendConfig)
     chain = OdometryChain(problem.poses, problem.odometry)
     of_loops = loop_scale(chain, loops, config.max_loop_scale)
     widened = [loop.widened(of_loops) for loop in loops]
-    believable = SLACK * cycle_scale(chain, widened, config.max_odometry_scale)
-    return odometry_scale(chain, widened, min(believable, config.max_odometry_scale)), of_loops
+    of_cycles = cycle_scale(chain, widened, config.max_odometry_scale)
+    believable = min(SLACK * of_cycles, config.max_odometry_scale)
+    return max(of_cycles, odometry_scale(chain, widened, believable)), of_loops
 
 
 def _screen(problem: GraphProblem, odometry: Sequence[Edge], loops: Sequence[Edge], config: BackendConfig) -> Screening:
