@@ -29,9 +29,12 @@ class _Inverted:
         return _Inverted(size, words[order], images[order], weights[order])
 
     def merged(self, other: "_Inverted") -> "_Inverted":
-        mine, theirs = (self.words, self.images, self.weights), (other.words, other.images, other.weights)
-        words, images, weights = (np.concatenate(pair) for pair in zip(mine, theirs, strict=True))
-        return _Inverted.sort(self.size + other.size, words, images, weights)
+        return _Inverted.sort(
+            self.size + other.size,
+            np.concatenate([self.words, other.words]),
+            np.concatenate([self.images, other.images]),
+            np.concatenate([self.weights, other.weights]),
+        )
 
     def smaller(self, bag: Bag) -> tuple[IntArray, Float32Array]:
         """Images and smaller weights of all words in common with the bag."""
@@ -69,7 +72,8 @@ class WordIndex:
         ours[bag[0]] = bag[1]
         recent = self._images.rows, np.minimum(ours[self._words.rows], self._weights.rows)
         found = [*(piece.smaller(bag) for piece in self._pieces), recent]
-        images, smaller = (np.concatenate(parts) for parts in zip(*found, strict=True))
+        images = np.concatenate([part for part, _ in found])
+        smaller = np.concatenate([part for _, part in found])
         return np.asarray(np.bincount(images, smaller, self._count), dtype=np.float64)
 
     def _sort_recent(self) -> None:
