@@ -2,10 +2,13 @@
 
     python benchmarks/odometry.py SEQUENCE... [--odometry NAME...] [--starts 0 2 4 6 8] [--optimize]
         [--peer PYTHON RUN.PY --depth-scale 5000]
+    python benchmarks/odometry.py SEQUENCE... --faults [--detector NAME]
 
 ``--optimize`` adds the error after the final bundle adjustment. ``--peer`` names a Python with the pyorbslam3 wheel
 and a script that runs it over a TUM-layout folder and writes a trajectory; it is run three times for each start, since
 it is not deterministic, and its median is quoted. Times are CPU seconds of the tracking thread, without decoding.
+``--faults`` runs each sequence whole, once for each fault put into it 10 s after its start; the last one leaves frames
+out behind a black-out, so that the camera wakes up elsewhere.
 """
 
 import argparse
@@ -18,16 +21,31 @@ from pathlib import Path
 
 import numpy as np
 
+from backend.pose_graph import PoseGraph
 from eval.trajectory import score_trajectory
+from frontend.odometry import Odometry
+from loop.verification import IcpVerifier
 from semslam import plugins
-from semslam.config import Config, DatasetConfig
+from semslam.config import Config, DatasetConfig, FaultConfig
 from semslam.datasets import Dataset, open_dataset
 from semslam.datasets.tum_format import read_trajectory
-from semslam.geometry import compose
+from semslam.pipeline import run
 from semslam.slam import Slam
-from semslam.types import TrackingStatus, Trajectory
+from semslam.stopwatch import Stopwatch
+from semslam.types import Frame, Motion, TrackingStatus, Trajectory
 
 PEER_RUNS = 3
+FRAME = 1 / 30
+FAULTS = {
+    "none": FaultConfig(),
+    "10 % of the frames dropped": FaultConfig(drop=0.1),
+    "1 s of black frames": FaultConfig(black=((10.0, 11.0),)),
+    "1 s without depth": FaultConfig(no_depth=((10.0, 11.0),)),
+    "2 s gap": FaultConfig(gaps=((10.0, 12.0),)),
+    "frames 0-199, 60 black, from 400 on": FaultConfig(
+        black=((199.5 * FRAME, 259.5 * FRAME),), gaps=((259.5 * FRAME, 399.5 * FRAME),)
+    ),
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,30 +59,38 @@ class Row:
     lost: int
 
 
+class TimedOdometry:
+    """An odometry whose every frame is timed."""
+
+    def __init__(self, odometry: Odometry) -> None:
+        self._odometry = odometry
+        self.milliseconds: list[float] = []
+
+    def track(self, frame: Frame) -> Motion:
+        """As the odometry's own."""
+        began = time.thread_time()
+        motion = self._odometry.track(frame)
+        self.milliseconds.append(1000 * (time.thread_time() - began))
+        return motion
+
+
 def track(name: str, path: Path, start: int, optimize: bool) -> Row:
     dataset = open_dataset(path, DatasetConfig(start=start))
     config = Config().with_changes(odometry=name, detector="none")
-    odometry = plugins.load("semslam.odometry", name).from_config(config)
-    motions, milliseconds = [], []
-    for frame in dataset:
-        began = time.thread_time()
-        motions.append(odometry.track(frame))
-        milliseconds.append(1000 * (time.thread_time() - began))
-    poses = compose([motion.T_prev_cur for motion in motions[1:]], np.eye(4))
-    return Row(
-        live=ate(dataset, np.array(dataset.timestamps), poses),
-        optimized=optimized_ate(dataset, config) if optimize else None,
-        median_ms=float(np.median(milliseconds)),
-        p95_ms=float(np.percentile(milliseconds, 95)),
-        lost=sum(motion.status is TrackingStatus.LOST for motion in motions),
+    odometry = TimedOdometry(plugins.load("semslam.odometry", name).from_config(config))
+    detector = plugins.load("semslam.detectors", "none").from_config(config)
+    slam = Slam(
+        odometry, None, detector, IcpVerifier.from_config(config), PoseGraph(config.backend), config, Stopwatch()
     )
-
-
-def optimized_ate(dataset: Dataset, config: Config) -> float:
-    slam = Slam.from_config(config)
-    for frame in dataset:
-        slam.process(frame)
-    return ate(dataset, np.array(dataset.timestamps), slam.finish().poses)
+    states = [slam.process(frame) for frame in dataset]
+    timestamps = np.array(dataset.timestamps)
+    return Row(
+        live=ate(dataset, timestamps, np.array([state.T_odom_cam for state in states])),
+        optimized=ate(dataset, timestamps, slam.finish().poses) if optimize else None,
+        median_ms=float(np.median(odometry.milliseconds)),
+        p95_ms=float(np.percentile(odometry.milliseconds, 95)),
+        lost=sum(state.status is TrackingStatus.LOST for state in states),
+    )
 
 
 def ate(dataset: Dataset, timestamps: np.ndarray, poses: np.ndarray) -> float:
@@ -89,6 +115,24 @@ def run_peer(peer: Sequence[str], path: Path, start: int, depth_scale: float) ->
     return errors
 
 
+def print_faults(path: Path, name: str, detector: str) -> None:
+    """Figures are of the largest map, as everywhere."""
+    print(
+        "| sequence | odometry | detector | fault | frames | tracked | maps | lost, s | live ATE (m) | final ATE (m) |"
+    )
+    print("|---|---|---|---|---|---|---|---|---|---|")
+    for label, faults in FAULTS.items():
+        settings = DatasetConfig(faults=faults)
+        config = Config().with_changes(odometry=name, detector=detector).model_copy(update={"dataset": settings})
+        found = run(open_dataset(path, settings), config).metrics
+        spells = ", ".join(f"{begin:.2f}-{end:.2f}" for begin, end in found.lost_intervals) or "-"
+        print(
+            f"| {path.name} | {name} | {detector} | {label} | {found.frames} | {found.tracked} | {found.maps} "
+            f"| {spells} | {found.odometry_only.ate_rmse_m:.4f} | {found.optimized.ate_rmse_m:.4f} |",
+            flush=True,
+        )
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("sequences", type=Path, nargs="+")
@@ -97,7 +141,14 @@ def main() -> None:
     parser.add_argument("--optimize", action="store_true")
     parser.add_argument("--peer", nargs=2, metavar=("PYTHON", "SCRIPT"))
     parser.add_argument("--depth-scale", type=float, default=5000.0, help="of the sequences, for the peer")
+    parser.add_argument("--faults", action="store_true")
+    parser.add_argument("--detector", default="none", help="with --faults")
     args = parser.parse_args()
+    if args.faults:
+        for path in args.sequences:
+            for name in args.odometry:
+                print_faults(path, name, args.detector)
+        return
     print("| sequence | odometry | start | live ATE (m) | optimised ATE (m) | median ms | p95 ms | lost |")
     print("|---|---|---|---|---|---|---|---|")
     for path in args.sequences:
