@@ -25,7 +25,7 @@ from semslam.config import BackendConfig
 from semslam.geometry import invert
 from semslam.types import FloatArray, LoopConstraint, RejectionReason
 
-SLACK = 1.5
+SLACK = 2.25
 """How much farther odometry's deviations may be widened than short cycles ask for: a bias grows with the way."""
 
 

@@ -6,7 +6,7 @@ import numpy.typing as npt
 from semslam.camera import Intrinsics
 from semslam.config import KeyframeConfig
 from semslam.geometry import Float32Array, FloatArray, invert, rotation_angle
-from semslam.types import Cloud, Features, Frame, Keyframe
+from semslam.types import Cloud, Features, Frame, Keyframe, UInt8Array
 
 STAMP_TOLERANCE = 1e-3
 """Seconds by which a stamp may fall short of the interval, so that rounded stamps keep a steady rhythm."""
@@ -42,12 +42,17 @@ class KeyframePolicy:
 
 
 def make_keyframe(
-    id: int, frame: Frame, T_odom_cam: FloatArray, map_id: int, features: Features, config: KeyframeConfig
+    id: int,
+    frame: Frame,
+    T_odom_cam: FloatArray,
+    map_id: int,
+    features: Features,
+    config: KeyframeConfig,
+    details: Features | None = None,
 ) -> Keyframe:
     """Keep of a frame what the loops and the back end need: features and a thinned cloud, no images."""
-    return Keyframe(
-        id, frame.index, frame.timestamp, T_odom_cam, map_id, frame.intrinsics, features, make_cloud(frame, config)
-    )
+    cloud = make_cloud(frame, config)
+    return Keyframe(id, frame.index, frame.timestamp, T_odom_cam, map_id, frame.intrinsics, features, cloud, details)
 
 
 def make_cloud(frame: Frame, config: KeyframeConfig) -> Cloud:
@@ -59,7 +64,8 @@ def make_cloud(frame: Frame, config: KeyframeConfig) -> Cloud:
     points = _grid_points(z, frame.intrinsics, half)
     normals, smooth = _grid_normals(points)
     kept = smooth & (z[1:-1, 1:-1] > 0) & (z[1:-1, 1:-1] <= config.max_depth)
-    return _thin(points[1:-1, 1:-1][kept], normals[kept], config.cloud_voxel)
+    colors = frame.color[half::CLOUD_STRIDE, half::CLOUD_STRIDE][1:-1, 1:-1]
+    return _thin(points[1:-1, 1:-1][kept], normals[kept], colors[kept], config.cloud_voxel)
 
 
 def _grid_points(z: Float32Array, camera: Intrinsics, offset: int) -> Float32Array:
@@ -84,8 +90,8 @@ def _grid_normals(points: Float32Array) -> tuple[Float32Array, npt.NDArray[np.bo
     return normals.astype(np.float32), smooth
 
 
-def _thin(points: Float32Array, normals: Float32Array, voxel: float) -> Cloud:
+def _thin(points: Float32Array, normals: Float32Array, colors: UInt8Array, voxel: float) -> Cloud:
     cells = np.floor(points / voxel).astype(np.int64) & VOXEL_MASK
     _, first = np.unique((cells[:, 0] << 42) | (cells[:, 1] << 21) | cells[:, 2], return_index=True)
     first.sort()
-    return Cloud(np.ascontiguousarray(points[first]), np.ascontiguousarray(normals[first]))
+    return Cloud(points[first], normals[first], colors[first])

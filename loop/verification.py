@@ -1,15 +1,14 @@
 """From a candidate to a constraint: a pose from features, refined on the clouds, behind gates."""
 
-from dataclasses import dataclass
 from typing import Protocol, Self, runtime_checkable
 
 import numpy as np
 
 from loop.free_space import free_space_violation
+from loop.guess import FeaturePair, Guess, pose_from_nodes
 from loop.registration import Fit, measure_fit, plane_information, refine
 from semslam.config import Config, VerificationConfig
-from semslam.features import PnpResult, match_descriptors, solve_pnp
-from semslam.geometry import invert, orthonormalise, transform_points
+from semslam.geometry import invert, orthonormalise
 from semslam.types import (
     FloatArray,
     IntArray,
@@ -32,21 +31,15 @@ class LoopVerifier(Protocol):
         """The relative pose with its covariance, or the first test that failed."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Guess:
-    """A pose that feature matches agree on."""
-
-    pnp: PnpResult
-    matches: IntArray  # (K, 2) query and match keypoints that agree
-
-
 class IcpVerifier:
-    """Feature matches give the pose (PnP RANSAC), ICP refines it, and gates test what comes out.
+    """A first guess from features and one from semantic nodes, ICP, and gates that test what comes out.
 
-    The relative pose from features is the first guess of point-to-plane ICP on the keyframes' clouds. ICP's pose is
-    kept unless it fits the clouds worse or moves the agreeing features far, as it does where a view holds one plane.
-    A constraint needs enough agreeing features, fitness, a small residual, overlap seen from both sides, no points in
-    space that the other view looked through, and a position that is determined.
+    PnP RANSAC on feature matches, and the rigid motion of matched semantic nodes, each say where the query may stand.
+    From there features are matched anew near where they are predicted, also after ICP; the guess that most features
+    agree on is kept. ICP on the keyframes' clouds then refines it, unless its pose fits the clouds worse or moves the
+    agreeing features far, as where a view holds one plane. A constraint needs enough agreeing features, fitness, a
+    small residual, overlap seen from both sides, no points in space that the other view looked through, and a
+    position that is determined.
     """
 
     def __init__(self, config: VerificationConfig, seed: int) -> None:
@@ -60,60 +53,67 @@ class IcpVerifier:
 
     def verify(self, query: Keyframe, match: Keyframe, candidate: LoopCandidate) -> LoopConstraint | LoopRejection:
         """See ``LoopVerifier``; the reason, figure and limit of a rejection are those of the first gate that closed."""
-        guess = self._guess(query, match, candidate)
-        if isinstance(guess, LoopRejection):
-            return guess
+        pair = FeaturePair(query, match, self._config.max_reprojection)
+        matches = pair.matches(self._config.match_ratio)
+        guess, figures = self._best_guess(query, match, candidate, pair, matches)
+        found, limit = 0 if guess is None else len(guess.matches), self._config.min_inliers
+        if guess is None or found < limit:
+            scarce = len(matches) < limit
+            reason = RejectionReason.FEW_MATCHES if scarce else RejectionReason.FEW_INLIERS
+            return LoopRejection(candidate, reason, len(matches) if scarce else found, limit)
         smaller = min(len(query.cloud), len(match.cloud))
         if smaller < self._config.min_points:
             return LoopRejection(candidate, RejectionReason.NO_CLOUD, smaller, self._config.min_points)
-        T_match_query, fit, method = self._refine(query, match, guess)
-        covariance = self._covariance(query, match, guess.pnp, T_match_query, fit, method)
+        T_match_query, fit, method = self._refine(query, match, pair, guess)
+        covariance = self._covariance(query, match, guess, T_match_query, fit, method)
         overlap = self._overlap(query, match, T_match_query)
         refusal = self._gate(query, match, candidate, T_match_query, fit, overlap, covariance)
         return refusal or LoopConstraint(
-            candidate, T_match_query, covariance, fit.fitness, fit.rmse, overlap, len(guess.matches), method
+            candidate, T_match_query, covariance, fit.fitness, fit.rmse, overlap, found, method, figures
         )
 
-    def _guess(self, query: Keyframe, match: Keyframe, candidate: LoopCandidate) -> _Guess | LoopRejection:
-        limit = self._config.min_inliers
-        pairs = match_descriptors(query.features.descriptors, match.features.descriptors, self._config.match_ratio)
-        pairs = pairs[match.features.depths[pairs[:, 1]] > 0]
-        if len(pairs) < limit:
-            return LoopRejection(candidate, RejectionReason.FEW_MATCHES, len(pairs), limit)
-        pnp = solve_pnp(
-            match.features.points[pairs[:, 1]], query.features.pixels[pairs[:, 0]], query.intrinsics,
-            self._config.max_reprojection, self._seed,
-        )  # fmt: skip
-        inliers = 0 if pnp is None else int(pnp.inliers.sum())
-        if pnp is None or inliers < limit:
-            return LoopRejection(candidate, RejectionReason.FEW_INLIERS, inliers, limit)
-        return _Guess(pnp, pairs[pnp.inliers])
+    def _best_guess(
+        self, query: Keyframe, match: Keyframe, candidate: LoopCandidate, pair: FeaturePair, matches: IntArray
+    ) -> tuple[Guess | None, dict[str, float]]:
+        """The guess that most features agree on, and how many agreed on each."""
+        config = self._config
+        figures: dict[str, float] = {}
+        starts: list[tuple[str, FloatArray]] = []
+        pnp = pair.solve(matches, self._seed)
+        if pnp is not None and pnp.inliers.sum() >= config.min_first_inliers:
+            starts.append(("features", pnp.T_ref_cam))
+            figures["first_inliers"] = float(pnp.inliers.sum())
+        nodes = pose_from_nodes(candidate.evidence.nodes, query.intrinsics, match.intrinsics)
+        if nodes is not None:
+            starts.append(("nodes", nodes[0]))
+            figures["matched_nodes"] = float(nodes[1])
+        best: Guess | None = None
+        for source, T in starts:
+            guess = pair.support(T, source)
+            if _count(guess) < config.min_inliers and _count(best) < config.min_inliers:
+                T_icp = orthonormalise(refine(query.cloud, match.cloud, T, config.search_distances, config.icp))
+                guess = max(guess, pair.support(T_icp, source), key=_count)
+            figures[f"{source}_guess"] = float(_count(guess))
+            best = max(best, guess, key=_count)
+        return best, figures
 
-    def _refine(self, query: Keyframe, match: Keyframe, guess: _Guess) -> tuple[FloatArray, Fit, str]:
+    def _refine(self, query: Keyframe, match: Keyframe, pair: FeaturePair, guess: Guess) -> tuple[FloatArray, Fit, str]:
         """The better of the two poses, how it fits, and its name."""
         config = self._config
-        T_pnp = guess.pnp.T_ref_cam
-        T_icp = orthonormalise(refine(query.cloud, match.cloud, T_pnp, config.icp_distances))
+        T_pnp = guess.T_match_query
+        T_icp = orthonormalise(refine(query.cloud, match.cloud, T_pnp, config.icp_distances, config.icp))
         fit_pnp, fit_icp = (measure_fit(query.cloud, match.cloud, T, config.fit_distance) for T in (T_pnp, T_icp))
         fits = fit_icp.fitness >= FITNESS_SLACK * fit_pnp.fitness
-        if fits and self._shift(query, match, guess.matches, T_icp) <= config.max_shift:
+        if fits and np.median(pair.errors(guess.matches, T_icp)) <= config.max_shift:
             return T_icp, fit_icp, "icp"
         return T_pnp, fit_pnp, "pnp"
 
-    def _shift(self, query: Keyframe, match: Keyframe, matches: IntArray, T_match_query: FloatArray) -> float:
-        """Median reprojection error in pixels of the agreeing features under another pose."""
-        points = transform_points(invert(T_match_query), match.features.points[matches[:, 1]])
-        if (points[:, 2] <= 0).any():
-            return float("inf")
-        errors = query.intrinsics.project(points) - query.features.pixels[matches[:, 0]]
-        return float(np.median(np.linalg.norm(errors, axis=1)))
-
     def _covariance(
-        self, query: Keyframe, match: Keyframe, pnp: PnpResult, T_match_query: FloatArray, fit: Fit, method: str
+        self, query: Keyframe, match: Keyframe, guess: Guess, T_match_query: FloatArray, fit: Fit, method: str
     ) -> FloatArray:
         """Covariance (6, 6) of T_match_query: formal ones of the parts, widened to what ground truth shows."""
         config = self._config
-        covariance: FloatArray = config.pnp_inflation * pnp.covariance
+        covariance: FloatArray = config.pnp_inflation * guess.covariance
         if method == "icp":
             planes = plane_information(query.cloud, match.cloud, T_match_query, fit.pairs)
             noise = config.icp_inflation * max(fit.rmse, 1e-3) ** 2
@@ -150,3 +150,7 @@ class IcpVerifier:
             if not passed:
                 return LoopRejection(candidate, reason, figure, limit)
         return None
+
+
+def _count(guess: Guess | None) -> int:
+    return 0 if guess is None else len(guess.matches)

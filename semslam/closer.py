@@ -85,6 +85,7 @@ class LoopCloser:
             self._segmenter = build_segmenter(self._config)
         self._verifier = verifier or IcpVerifier.from_config(self._config)
         self._extractor = FeatureExtractor(self._config.features)
+        self._details = FeatureExtractor(self._config.verification.features)
         self._keys: list[int] = []
         self._keyframes: list[Keyframe] = []
         self._closures: list[Closure] = []
@@ -132,7 +133,8 @@ class LoopCloser:
         pose = np.eye(4) if T_world_cam is None else checked_pose(T_world_cam, f"The pose of key {key}")
         frame = self._frame(color, depth, timestamp)
         features = self._extractor.extract(frame)
-        keyframe = make_keyframe(frame.index, frame, pose, 0, features, self._config.keyframes)
+        details = self._details.extract(frame)
+        keyframe = make_keyframe(frame.index, frame, pose, 0, features, self._config.keyframes, details)
         if labels is None and self._segmenter is not None:
             labels = self._segmenter.segment(frame.color)
         view = KeyframeView(keyframe, frame.color, frame.depth, labels)

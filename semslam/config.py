@@ -285,10 +285,16 @@ class Conv3Config(Section):
 class VerificationConfig(Section):
     """Gates between a candidate and a constraint."""
 
+    features: FeatureConfig = FeatureConfig(count=2000, per_cell=12)
     min_inliers: int = Field(20, gt=5, description="feature matches that must agree on the pose")
+    min_first_inliers: int = Field(
+        8, gt=5, description="matches that must agree on it before they are looked for there"
+    )
     match_ratio: float = Field(0.9, gt=0, le=1, description="a match's distance over that of the second best, at most")
     max_reprojection: float = Field(3.0, gt=0, description="pixels within which a match agrees with a pose")
     min_points: int = Field(100, gt=5, description="points that both clouds must have")
+    icp: Literal["point_to_plane", "generalized", "colored"] = Field("point_to_plane", description="kind of ICP")
+    search_distances: tuple[float, ...] = Field((0.3, 0.1), description="metres, the same where few features agree yet")
     icp_distances: tuple[float, ...] = Field((0.1, 0.05), description="metres, correspondence limit of each ICP pass")
     max_shift: float = Field(20.0, gt=0, description="pixels, median, by which ICP may move the agreeing matches")
     fit_distance: float = Field(0.05, gt=0, description="metres within which a point meets the other surface")

@@ -126,13 +126,18 @@ def match_descriptors(query: UInt8Array, train: UInt8Array, ratio: float = 0.9) 
     """
     if not len(query) or not len(train):
         return np.zeros((0, 2), dtype=np.int64)
-    distances = hamming_distances(query, train)
-    rows = np.arange(len(query))
+    return mutual_matches(hamming_distances(query, train), ratio)
+
+
+def mutual_matches(distances: npt.NDArray[np.int16], ratio: float) -> IntArray:
+    """The pairs (K, 2) of ``match_descriptors``, from distances (N, M) with N and M at least 1."""
+    rows = np.arange(len(distances))
     best = distances.argmin(1)
     mutual = distances.argmin(0)[best] == rows
     nearest = distances[rows, best].copy()
     distances[rows, best] = np.iinfo(np.int16).max
     kept = mutual & (nearest < ratio * distances.min(1))
+    distances[rows, best] = nearest
     return np.column_stack([rows[kept], best[kept]])
 
 

@@ -133,6 +133,7 @@ class Slam:
         self._config = config
         self._stopwatch = stopwatch
         self._extractor = FeatureExtractor(config.features)
+        self._details = FeatureExtractor(config.verification.features)
         self._policy = KeyframePolicy(config.keyframes)
         self._T_odom_cam: FloatArray = np.eye(4)
         self._anchors: dict[int, _Anchor] = {}
@@ -240,6 +241,7 @@ class Slam:
                 motion.map_id,
                 self._extractor.extract(frame),
                 self._config.keyframes,
+                self._details.extract(frame),
             )
         self._policy.note(frame.timestamp, self._T_odom_cam, motion.map_id)
         self._connect(keyframe)

@@ -85,10 +85,17 @@ class Features:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Cloud:
-    """A thinned point cloud in the camera frame: points (N, 3) metres and unit normals (N, 3), float32."""
+    """A thinned point cloud in the camera frame.
+
+    Attributes:
+        points: (N, 3) float32 metres.
+        normals: (N, 3) float32, of length 1.
+        colors: (N, 3) uint8 RGB, where they are known.
+    """
 
     points: Float32Array
     normals: Float32Array
+    colors: UInt8Array | None = None
 
     def __len__(self) -> int:
         return len(self.points)
@@ -169,6 +176,7 @@ class Keyframe:
         intrinsics: the camera.
         features: keypoints with depth.
         cloud: a thinned cloud with normals.
+        details: more keypoints, for the verification of loops; None = the features serve.
     """
 
     id: int
@@ -179,6 +187,7 @@ class Keyframe:
     intrinsics: Intrinsics
     features: Features
     cloud: Cloud
+    details: Features | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -260,6 +269,7 @@ class LoopConstraint:
         overlap: the smaller share of either view that the other one sees, 0..1.
         inliers: feature matches that support the pose.
         method: which estimate was kept, such as "pnp" or "icp".
+        figures: what the steps on the way measured, by name.
     """
 
     candidate: LoopCandidate
@@ -270,6 +280,7 @@ class LoopConstraint:
     overlap: float
     inliers: int
     method: str
+    figures: dict[str, float] = field(default_factory=dict)
 
 
 class RejectionReason(StrEnum):
