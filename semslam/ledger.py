@@ -59,6 +59,7 @@ class LedgerEntry:
         fitness: share of points that meet the other surface, or None.
         inlier_rmse_m: metres, or None.
         overlap: the smaller two-way overlap, or None.
+        figures: what the verification's steps measured, by name, or None.
         T_match_query: rows of the (4, 4) relative pose, or None.
         weight: the back end's weight, 0..1, or None.
         truth: the judgement and pose error, where the loop was verified and ground truth covers both frames.
@@ -83,6 +84,7 @@ class LedgerEntry:
     fitness: float | None = None
     inlier_rmse_m: float | None = None
     overlap: float | None = None
+    figures: dict[str, float] | None = None
     T_match_query: list[list[float]] | None = None
     weight: float | None = None
     truth: JudgedLoop | None = None
@@ -161,6 +163,7 @@ def verified_entry(
         fitness=constraint.fitness,
         inlier_rmse_m=constraint.inlier_rmse,
         overlap=constraint.overlap,
+        figures=constraint.figures,
         T_match_query=pose.tolist(),
         weight=graph.weight,
         truth=truth,
