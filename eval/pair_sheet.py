@@ -37,8 +37,9 @@ def draw_sheet(pairs: Sequence[Pair], title: str) -> bytes:
 
 
 def _spread(pairs: Sequence[Pair]) -> list[Pair]:
-    """Examples of different kinds, evenly spaced in their order."""
+    """Examples of different kinds where there are enough, evenly spaced in their order."""
     kinds = list({pair.kind: pair for pair in reversed(pairs)}.values())[::-1]
+    kinds = kinds if len(kinds) >= EXAMPLES else list(pairs)
     places = np.linspace(0, len(kinds) - 1, min(EXAMPLES, len(kinds))).round().astype(int)
     return [kinds[int(place)] for place in places]
 

@@ -41,6 +41,16 @@ def pair_rows(tested: Sequence[ScoredPairs], thresholds: Thresholds) -> str:
     return text.getvalue()
 
 
+def kind_rows(kinds: Sequence[KindAccuracy]) -> str:
+    """A CSV with a row for each kind of change and a column for each detector's share told rightly."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(("kind", "pairs", *(kinds[0].told if kinds else ())))
+    for kind in kinds:
+        writer.writerow((kind.kind, kind.pairs, *(f"{share:.4f}" for share in kind.told.values())))
+    return text.getvalue()
+
+
 def told_by_kind(tested: Sequence[ScoredPairs], thresholds: Thresholds) -> list[KindAccuracy]:
     """Shares told rightly by kind of change, those of the same place first; look-alikes of a group are one kind."""
     told: dict[str, dict[str, list[bool]]] = {}

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 PROBABILISTIC = "fused"
 """The detector whose score is a probability."""
+MAX_COLUMNS = 5
+"""More detectors than these make a table by change too wide for a terminal; it is in a file in any case."""
 GROUPS = ("viewpoint", "illumination", "objects")
 
 
@@ -132,14 +134,16 @@ def pairs_command(
 
 
 def _write_pairs(trial: "PairTrial", directory: Path) -> None:
-    """Write pairs.json, a row for each pair and detector (pairs.csv), and a sheet of examples for each set."""
+    """Write pairs.json, tables of all pairs and of all kinds of change, and a sheet of examples for each set."""
     from eval.pair_sheet import draw_sheet
-    from eval.pair_table import pair_rows
+    from eval.pair_table import kind_rows, pair_rows, told_by_kind
     from semslam.results import write_json, writing
 
     write_json(directory / "pairs.json", {"detectors": [asdict(quality) for quality in trial.qualities]})
     with writing(directory):
         (directory / "pairs.csv").write_text(pair_rows(trial.tested, trial.thresholds), encoding="utf-8")
+        kinds = told_by_kind(trial.tested, trial.thresholds)
+        (directory / "kinds.csv").write_text(kind_rows(kinds), encoding="utf-8")
         for number, some in enumerate(trial.tested, start=1):
             (directory / f"pairs-{number}.png").write_bytes(draw_sheet(some.pairs, some.name))
 
@@ -156,11 +160,13 @@ def _print_pairs(trial: "PairTrial") -> None:
         table.add_row(quality.detector, *("-" if cell is None else f"{cell.accuracy:.3f}" for cell in cells))
     out.print(table)
     names = [quality.detector for quality in trial.qualities]
+    if len(names) > MAX_COLUMNS:
+        return
     table = Table(title="The same, by what was changed (pairs)", title_justify="left")
     for heading in ("change", "pairs", *names):
-        table.add_column(heading, justify="left" if heading == "change" else "right")
+        table.add_column(heading, justify="left" if heading == "change" else "right", no_wrap=True)
     for kind in told_by_kind(trial.tested, trial.thresholds):
-        table.add_row(kind.kind, str(kind.pairs), *(f"{kind.told[name]:.3f}" for name in names))
+        table.add_row(kind.kind, str(kind.pairs), *(f"{kind.told[name]:.2f}" for name in names))
     out.print(table)
 
 
