@@ -351,7 +351,7 @@ class Config(Section):
 
     seed: int = Field(0, ge=0, description="seed of everything that draws random numbers")
     odometry: str = Field("feature_map", description="registered odometry")
-    detector: str = Field("semantic", description="registered loop detector")
+    detector: str = Field("fused", description="registered loop detector")
     dataset: DatasetConfig = DatasetConfig()
     features: FeatureConfig = FeatureConfig()
     keyframes: KeyframeConfig = KeyframeConfig()
