@@ -21,6 +21,10 @@ from semslam.types import (
 
 FITNESS_SLACK = 0.95
 """Share of the first guess's fitness that ICP's pose must keep: the loss may trade some points for a better fit."""
+ROTATION_GROWTH, TRANSLATION_GROWTH = 0.5, 1.5
+"""Powers of the overlap that errors grow with as it falls, fitted to ground truth on two real sequences."""
+MIN_SEEN = 0.05
+"""Overlap below which they grow no more; the gates refuse such loops."""
 
 
 @runtime_checkable
@@ -65,8 +69,8 @@ class IcpVerifier:
         if smaller < self._config.min_points:
             return LoopRejection(candidate, RejectionReason.NO_CLOUD, smaller, self._config.min_points)
         T_match_query, fit, method = self._refine(query, match, pair, guess)
-        covariance = self._covariance(query, match, guess, T_match_query, fit, method)
         overlap = self._overlap(query, match, T_match_query)
+        covariance = self._covariance(query, match, guess, T_match_query, fit, method, overlap)
         refusal = self._gate(query, match, candidate, T_match_query, fit, overlap, covariance)
         return refusal or LoopConstraint(
             candidate, T_match_query, covariance, fit.fitness, fit.rmse, overlap, found, method, figures
@@ -109,8 +113,9 @@ class IcpVerifier:
         return T_pnp, fit_pnp, "pnp"
 
     def _covariance(
-        self, query: Keyframe, match: Keyframe, guess: Guess, T_match_query: FloatArray, fit: Fit, method: str
-    ) -> FloatArray:
+        self, query: Keyframe, match: Keyframe, guess: Guess, T_match_query: FloatArray, fit: Fit, method: str,
+        overlap: float,
+    ) -> FloatArray:  # fmt: skip
         """Covariance (6, 6) of T_match_query: formal ones of the parts, widened to what ground truth shows."""
         config = self._config
         covariance: FloatArray = config.pnp_inflation * guess.covariance
@@ -118,7 +123,9 @@ class IcpVerifier:
             planes = plane_information(query.cloud, match.cloud, T_match_query, fit.pairs)
             noise = config.icp_inflation * max(fit.rmse, 1e-3) ** 2
             covariance = np.asarray(np.linalg.inv(np.linalg.inv(covariance) + planes / noise))
-        floor = np.repeat([config.sigma_rotation, config.sigma_translation], 3) ** 2
+        seen = max(overlap, MIN_SEEN)
+        sigmas = config.sigma_rotation / seen**ROTATION_GROWTH, config.sigma_translation / seen**TRANSLATION_GROWTH
+        floor = np.repeat(sigmas, 3) ** 2
         covariance = covariance + np.diag(floor)
         return (covariance + covariance.T) / 2
 

@@ -306,8 +306,8 @@ class VerificationConfig(Section):
     max_sigma: float = Field(0.25, gt=0, description="metres, standard deviation of the position at the most")
     icp_inflation: float = Field(50.0, gt=0, description="factor on ICP's formal variance: points err together")
     pnp_inflation: float = Field(30.0, gt=0, description="factor on PnP's formal variance")
-    sigma_rotation: float = Field(0.015, ge=0, description="radians, error that no formal variance knows of")
-    sigma_translation: float = Field(0.02, ge=0, description="metres, the same")
+    sigma_rotation: float = Field(0.012, ge=0, description="radians, error that no formal variance knows of")
+    sigma_translation: float = Field(0.012, ge=0, description="metres, the same; both at full overlap")
 
 
 class BundleConfig(Section):

@@ -1,15 +1,28 @@
 """Verification: pose, gates and covariance on a room corner with exact truth, and on real frames."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from loop.free_space import free_space_violation
-from loop.registration import measure_fit, refine
+from loop.registration import ICP_KINDS, measure_fit, refine
 from loop.verification import IcpVerifier
 from semslam.camera import Intrinsics
 from semslam.config import Config
+from semslam.errors import ConfigError
 from semslam.geometry import exp_so3, invert, make_transform, rotation_angle, transform_points
-from semslam.types import Cloud, Features, FloatArray, Keyframe, LoopCandidate, LoopConstraint, LoopRejection
+from semslam.types import (
+    Cloud,
+    Features,
+    FloatArray,
+    Keyframe,
+    LoopCandidate,
+    LoopConstraint,
+    LoopEvidence,
+    LoopRejection,
+    NodePair,
+)
 
 CAMERA = Intrinsics(640, 480, 525, 525, 319.5, 239.5)
 T_WORLD_MATCH = np.eye(4)
@@ -129,6 +142,72 @@ def test_icp_that_slides_away_from_the_features_is_not_kept() -> None:
     assert loop.method == "pnp"
 
 
+def with_nodes(count: int, noise: float) -> LoopCandidate:
+    """A candidate with semantic nodes that both views of the corner hold, centroids off by ``noise`` metres."""
+    rng = np.random.default_rng(3)
+    points, _ = corner()
+    inside = visible(transform_points(invert(T_WORLD_MATCH), points))
+    inside &= visible(transform_points(invert(T_WORLD_QUERY), points))
+    chosen = points[rng.choice(np.flatnonzero(inside), count, replace=False)]
+    pairs = []
+    for point in chosen:
+        seen = [transform_points(invert(T), point[None]) for T in (T_WORLD_QUERY, T_WORLD_MATCH)]
+        query, match = (p + rng.normal(0, noise, (1, 3)) for p in seen)
+        pairs.append(NodePair("chair", *((*CAMERA.project(p)[0], p[0, 2]) for p in (query, match))))
+    return LoopCandidate(1, 0, 0.5, "test", LoopEvidence(nodes=tuple(pairs)))
+
+
+def test_nodes_lead_to_the_pose_where_features_give_no_first_guess() -> None:
+    config = Config().with_changes(verification={"min_first_inliers": 10_000})
+    pair = keyframe(1, T_WORLD_QUERY), keyframe(0, T_WORLD_MATCH)
+    assert refused(IcpVerifier.from_config(config).verify(*pair, CANDIDATE)).reason == "few_inliers"
+    loop = IcpVerifier.from_config(config).verify(*pair, with_nodes(8, 0.05))
+    assert isinstance(loop, LoopConstraint)
+    assert loop.figures["matched_nodes"] >= 3
+    assert loop.figures["nodes_guess"] == loop.inliers >= 20
+    assert np.linalg.norm((invert(T_WORLD_QUERY) @ loop.T_match_query)[:3, 3]) < 0.01
+
+
+def test_nodes_alone_are_no_proof() -> None:
+    strangers = keyframe(1, T_WORLD_QUERY, seed=5), keyframe(0, T_WORLD_MATCH)
+    outcome = IcpVerifier.from_config(Config()).verify(*strangers, with_nodes(8, 0.05))
+    assert refused(outcome).reason in {"few_matches", "few_inliers"}
+
+
+def test_more_keypoints_serve_the_verification_where_there_are_any() -> None:
+    query, match = keyframe(1, T_WORLD_QUERY), keyframe(0, T_WORLD_MATCH)
+    poor = replace(query, features=keyframe(1, T_WORLD_QUERY, seed=5).features)
+    assert isinstance(verify(poor, match), LoopRejection)
+    assert isinstance(verify(replace(poor, details=query.features), match), LoopConstraint)
+
+
+@pytest.mark.parametrize("kind", ICP_KINDS)
+def test_every_kind_of_icp_improves_a_poor_guess_and_repeats(kind: str) -> None:
+    query, match = (coloured(keyframe(i, T), T) for i, T in enumerate((T_WORLD_QUERY, T_WORLD_MATCH)))
+    guess = T_WORLD_QUERY @ make_transform(exp_so3([0.01, -0.01, 0.01]), [0.03, 0.02, -0.03])
+    first, second = (refine(query.cloud, match.cloud, guess, (0.1, 0.05), kind) for _ in range(2))
+    assert first.tobytes() == second.tobytes()
+    assert np.linalg.norm((invert(T_WORLD_QUERY) @ first)[:3, 3]) < 0.015
+    far = make_transform(np.eye(3), [100, 0, 0])
+    np.testing.assert_array_equal(refine(query.cloud, match.cloud, far, (0.1,), kind), far)
+    assert isinstance(verify(query, match, icp=kind), LoopConstraint)
+
+
+def coloured(keyframe: Keyframe, T_world_cam: FloatArray) -> Keyframe:
+    """The same with a cloud whose colours change smoothly over the corner."""
+    world = transform_points(T_world_cam, keyframe.cloud.points)
+    colors = (127.5 + 120 * np.sin(3 * world)).astype(np.uint8)
+    return replace(keyframe, cloud=Cloud(keyframe.cloud.points, keyframe.cloud.normals, colors))
+
+
+def test_an_unknown_icp_and_missing_colours_are_one_clear_error() -> None:
+    cloud = keyframe(0, T_WORLD_MATCH).cloud
+    with pytest.raises(ConfigError, match="no kind of ICP"):
+        refine(cloud, cloud, np.eye(4), (0.1,), "magic")
+    with pytest.raises(ConfigError, match="colours"):
+        refine(cloud, cloud, np.eye(4), (0.1,), "colored")
+
+
 def test_refine_pulls_a_poor_guess_in_and_leaves_a_lone_cloud() -> None:
     query, match = keyframe(1, T_WORLD_QUERY), keyframe(0, T_WORLD_MATCH)
     guess = T_WORLD_QUERY @ make_transform(exp_so3([0.01, -0.01, 0.01]), [0.03, 0.02, -0.03])
@@ -173,3 +252,30 @@ def test_real_neighbours_are_verified_at_the_true_pose_and_strangers_are_not(sha
     assert np.linalg.norm(error[:3, 3]) < 0.05
     assert rotation_angle(error) < np.radians(4)
     assert isinstance(verify(keyframes[2], keyframes[0]), LoopRejection)
+
+
+def test_no_wrong_place_is_accepted_among_the_keyframes_of_three_places(shared) -> None:
+    from frontend.keyframes import make_keyframe
+    from semslam.datasets import open_dataset
+    from semslam.features import FeatureExtractor
+
+    config = Config()
+    extractor, details = FeatureExtractor(config.features), FeatureExtractor(config.verification.features)
+    data = shared / "data"
+    places = (data / "redkitchen", data / "rgbd_dataset_freiburg1_rpy_first10s", "synthetic:room?frames=60")
+    mixed: list[tuple[int, Keyframe]] = []
+    for place, path in enumerate(places):
+        dataset = open_dataset(path)
+        for index in range(0, len(dataset), -(-len(dataset) // 4)):
+            frame = dataset.frame(index)
+            found = (extractor.extract(frame), details.extract(frame))
+            keyframe = make_keyframe(len(mixed), frame, np.eye(4), 0, found[0], config.keyframes, found[1])
+            mixed.append((place, keyframe))
+    verifier = IcpVerifier.from_config(config)
+    accepted = [
+        (query.id, match.id)
+        for here, query in mixed
+        for there, match in mixed
+        if here != there and isinstance(verifier.verify(query, match, CANDIDATE), LoopConstraint)
+    ]
+    assert accepted == []
