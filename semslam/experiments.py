@@ -86,7 +86,7 @@ def keyframe_views(
     """
     odometry = plugins.load("semslam.odometry", config.odometry).from_config(config)
     segmenter = build_segmenter(config) if needs_labels else None
-    extractor = FeatureExtractor(config.features)
+    extractor, details = FeatureExtractor(config.features), FeatureExtractor(config.verification.features)
     T_odom_cam = np.eye(4)
     count = 0
     for index, frame in enumerate(prefetch(dataset)):
@@ -98,8 +98,8 @@ def keyframe_views(
         T_odom_cam = T_odom_cam @ odometry.track(frame).T_prev_cur
         if index % every:
             continue
-        features = extractor.extract(frame)
-        keyframe = make_keyframe(count, frame, T_odom_cam, 0, features, config.keyframes)
+        features, more = extractor.extract(frame), details.extract(frame)
+        keyframe = make_keyframe(count, frame, T_odom_cam, 0, features, config.keyframes, more)
         labels = None if segmenter is None else segmenter.segment(frame.color, frame.index)
         count += 1
         yield KeyframeView(keyframe, frame.color, frame.depth, labels)
