@@ -1,0 +1,125 @@
+"""Measure the verification on posed sequences: poses found, wrong places accepted, covariances against the truth.
+
+    python benchmarks/verification.py SEQ... [--every 5] [--detector fused] [--icp colored]
+
+All sequences go into one database, one after the other; the detector proposes across them. Printed for each sequence:
+queries that have a true past loop and the share of them that gets a pose within 0.2 m and 10 degrees, loops verified,
+those with a pose that is off, those of a wrong place, pose errors, and the mean and percentiles of the normalised
+squared error (six degrees of freedom, so 6 is exact).
+"""
+
+import argparse
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from eval.loop_truth import ANGLE_TOLERANCE, POSE_TOLERANCE, LoopTruth, find_loop_truth, make_view
+from eval.trajectory import poses_at
+from frontend.keyframes import make_keyframe
+from loop.detector import LoopDetector
+from loop.segmentation.build import build_segmenter
+from loop.verification import IcpVerifier
+from semslam import plugins
+from semslam.config import Config
+from semslam.datasets import open_dataset
+from semslam.features import FeatureExtractor
+from semslam.geometry import FloatArray, invert, log_so3, rotation_angle
+from semslam.types import Keyframe, KeyframeView, LoopConstraint
+
+PAUSE = 1000.0
+"""Seconds put between two sequences."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Part:
+    """A sequence's keyframes in the common database: ids from ``first``, true poses, true and false pairs."""
+
+    name: str
+    first: int
+    poses: FloatArray
+    truth: LoopTruth
+    loops: list[LoopConstraint]
+
+
+def keyframes(path: str, every: int, config: Config, first: int, start: float) -> Iterator[KeyframeView]:
+    """Every n-th frame with its images and labels, numbered from ``first``, ``start`` seconds later."""
+    dataset, segmenter = open_dataset(path), build_segmenter(config)
+    extractor, details = FeatureExtractor(config.features), FeatureExtractor(config.verification.features)
+    for number, index in enumerate(range(0, len(dataset), every)):
+        frame = dataset.frame(index)
+        found = extractor.extract(frame), details.extract(frame)
+        keyframe = make_keyframe(first + number, frame, np.eye(4), 0, found[0], config.keyframes, found[1])
+        labels = segmenter.segment(frame.color, frame.index)
+        later = replace(keyframe, timestamp=keyframe.timestamp + start)
+        yield KeyframeView(later, frame.color, frame.depth, labels)
+
+
+def run(path: str, every: int, config: Config, detector: LoopDetector, known: list[Keyframe]) -> Part:
+    """Query, verify and add each keyframe of a sequence; ``known`` grows."""
+    dataset = open_dataset(path)
+    assert dataset.ground_truth is not None, f"{path} has no ground truth."
+    verifier, first = IcpVerifier.from_config(config), len(known)
+    start = 0.0 if not known else known[-1].timestamp + PAUSE - dataset.timestamps[0]
+    loops, depths, spent, tried = [], [], 0.0, 0
+    for view in keyframes(path, every, config, first, start):
+        candidates = detector.query(view)
+        detector.add(view)
+        known.append(view.keyframe)
+        depths.append(make_view(view.depth, view.keyframe.intrinsics))
+        before = time.process_time()
+        outcomes = [verifier.verify(view.keyframe, known[c.match], c) for c in candidates]
+        spent, tried = spent + time.process_time() - before, tried + len(outcomes)
+        loops += [outcome for outcome in outcomes if isinstance(outcome, LoopConstraint)]
+    stamps = np.array([keyframe.timestamp - start for keyframe in known[first:]])
+    poses, _ = poses_at(dataset.ground_truth, stamps)
+    print(f"{dataset.name}: {tried} candidates, {1e3 * spent / max(tried, 1):.0f} CPU ms each", flush=True)
+    return Part(dataset.name, first, poses, find_loop_truth(stamps, depths, dataset.ground_truth), loops)
+
+
+def report(part: Part) -> None:
+    """Print a sequence's figures."""
+    elsewhere = [loop for loop in part.loops if loop.candidate.match < part.first]
+    here = [loop for loop in part.loops if loop.candidate.match >= part.first]
+    errors, squared, good, wrong = [], [], set(), len(elsewhere)
+    for loop in here:
+        query, match = loop.candidate.query - part.first, loop.candidate.match - part.first
+        E = invert(invert(part.poses[match]) @ part.poses[query]) @ loop.T_match_query
+        tangent = np.r_[log_so3(E[:3, :3]), E[:3, 3]]
+        squared.append(float(tangent @ np.linalg.solve(loop.covariance, tangent)))
+        errors.append((float(np.linalg.norm(E[:3, 3])), float(np.degrees(rotation_angle(E)))))
+        if errors[-1][0] <= POSE_TOLERANCE and errors[-1][1] <= ANGLE_TOLERANCE:
+            good.add(query)
+        else:
+            wrong += bool(part.truth.false_pairs[query, match])
+    asked = set(np.flatnonzero(part.truth.true_pairs.any(1)).tolist())
+    off = sum(metres > POSE_TOLERANCE or degrees > ANGLE_TOLERANCE for metres, degrees in errors)
+    print(
+        f"{part.name}: {len(asked)} queries, share with a pose {len(good & asked) / max(len(asked), 1):.3f};"
+        f" {len(part.loops)} verified, {off} off, {wrong} of a wrong place"
+    )
+    if errors:
+        metres, degrees = np.array(errors).T
+        print(f"  cm 50/95/100 % {(100 * np.percentile(metres, [50, 95, 100])).round(1)}", end="")
+        print(f"  degrees {np.percentile(degrees, [50, 95, 100]).round(2)}", end="")
+        print(f"  NEES mean {np.mean(squared):.1f}, 50/90/99 % {np.percentile(squared, [50, 90, 99]).round(1)}")
+
+
+def main() -> None:
+    """Measure all sequences in one database."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("sequences", nargs="+")
+    parser.add_argument("--every", type=int, default=5)
+    parser.add_argument("--detector", default="fused")
+    parser.add_argument("--icp", default="point_to_plane")
+    arguments = parser.parse_args()
+    config = Config().with_changes(verification={"icp": arguments.icp})
+    detector = plugins.load("semslam.detectors", arguments.detector).from_config(config)
+    known: list[Keyframe] = []
+    for path in arguments.sequences:
+        report(run(path, arguments.every, config, detector, known))
+
+
+if __name__ == "__main__":
+    main()
