@@ -162,7 +162,9 @@ def read_recording(directory: Path) -> Recording:
             interrupted=bool(arrays["interrupted"]),
             checksum=int(arrays["checksum"]),
         )
-    except (OSError, EOFError, KeyError, IndexError, TypeError, ValueError, zipfile.BadZipFile, zlib.error) as error:
+    except KeyError as error:
+        raise ResultsError(f"The saved front end in {directory} was written by another version.") from error
+    except (OSError, EOFError, IndexError, TypeError, ValueError, zipfile.BadZipFile, zlib.error) as error:
         raise ResultsError(f"The saved front end in {directory} is damaged.") from error
 
 

@@ -168,6 +168,17 @@ def test_a_damaged_recording_is_named(tmp_path: Path, name: str) -> None:
         read_front_end(tmp_path)
 
 
+def test_a_recording_of_another_version_is_named(tmp_path: Path) -> None:
+    frames = tuple(_frame(index, 3, np.random.default_rng(0)) for index in range(3))
+    write_recording(tmp_path, Recording(frames, (), interrupted=False, checksum=1))
+    with np.load(tmp_path / "frontend.npz") as file:
+        arrays = dict(file)
+    del arrays["depths"]
+    np.savez(tmp_path / "frontend.npz", **arrays)
+    with pytest.raises(ResultsError, match="written by another version"):
+        read_front_end(tmp_path)
+
+
 def _frame(index: int, seen: int | None, rng: np.random.Generator) -> RecordedFrame:
     observations = None
     if seen is not None:
