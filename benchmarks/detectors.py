@@ -194,6 +194,7 @@ def print_verified(dataset: Dataset, names: list[str], every: int) -> None:
     truth = find_loop_truth(stamps, [make_view(v.depth, v.keyframe.intrinsics) for v in views], dataset.ground_truth)
     poses, _ = poses_at(dataset.ground_truth, stamps)
     verifier = IcpVerifier.from_config(config)
+    print(f"{dataset.name}: after verification\n")
     print("| detector | proposed | accepted | pose off | wrong place | queries closed |")
     print("|---|---|---|---|---|---|")
     for name in names:
