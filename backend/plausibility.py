@@ -24,6 +24,8 @@ CLEARLY = 3
 """How many times as many loops a group needs to outweigh another one."""
 NEARER = 2.0
 """How many times as far from odometry a group must lie to be outweighed by another one."""
+ALONE = 1.5
+"""How many times the limit a pair must be off that alone sets two groups apart: one in a thousand is off by chance."""
 UNIT = 1.0
 """Mahalanobis distances below this are all alike."""
 
@@ -97,7 +99,7 @@ def _ambiguous(chain: OdometryChain, loops: Sequence[Edge], distances: FloatArra
     a, b = np.minimum(group[first], group[second]), np.maximum(group[first], group[second])
     for g, h in np.unique(np.column_stack([a, b])[a != b], axis=0).tolist():
         shared = (a == g) & (b == h)
-        if np.median(off[shared]) <= limit:
+        if np.median(off[shared]) <= (limit if shared.sum() > 1 else ALONE * limit):
             continue
         for mine, other in ((g, h), (h, g)):
             if not _outweighs(size[mine], typical[mine], size[other], typical[other]):

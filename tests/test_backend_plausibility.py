@@ -138,3 +138,11 @@ def test_twin_rooms_do_not_make_odometry_look_worse():
     drifting = OdometryChain(range(len(TRUTH)), measure_odometry(TRUTH, rng, 5.0))
     assert cycle_scale(drifting, false[:15], 10.0) > 2.0
     assert cycle_scale(chain, [], 10.0) == cycle_scale(chain, false[:2], 10.0) == 1.0
+
+
+def test_one_noisy_pair_does_not_split_a_group_in_two():
+    truth, rng = ring(240, 4), np.random.default_rng(0)
+    pairs = [(k - 60, k) for k in range(60, 240, 4)]
+    loops = measure(truth, pairs, rng, 1.0, np.array([0.01] * 3 + [0.02] * 3))
+    chain = OdometryChain(range(240), measure_odometry(truth, rng))
+    assert set(screen_loops(chain, loops, LIMIT / 1.5, 1.5).reasons) == {None}
