@@ -44,13 +44,16 @@ class Part:
 
 
 def keyframes(path: str, every: int, config: Config, first: int, start: float) -> Iterator[KeyframeView]:
-    """Every n-th frame with its images and labels, numbered from ``first``, ``start`` seconds later."""
+    """Every n-th frame with its images, labels and true pose, numbered from ``first``, ``start`` seconds later."""
     dataset, segmenter = open_dataset(path), build_segmenter(config)
+    assert dataset.ground_truth is not None, f"{path} has no ground truth."
+    poses, _ = poses_at(dataset.ground_truth, dataset.timestamps[::every])
     extractor, details = FeatureExtractor(config.features), FeatureExtractor(config.verification.features)
     for number, index in enumerate(range(0, len(dataset), every)):
         frame = dataset.frame(index)
         found = extractor.extract(frame), details.extract(frame)
-        keyframe = make_keyframe(first + number, frame, np.eye(4), 0, found[0], config.keyframes, found[1])
+        T_odom_cam = invert(poses[0]) @ poses[number]  # detectors turn images upright by it
+        keyframe = make_keyframe(first + number, frame, T_odom_cam, 0, found[0], config.keyframes, found[1])
         labels = segmenter.segment(frame.color, frame.index)
         later = replace(keyframe, timestamp=keyframe.timestamp + start)
         yield KeyframeView(later, frame.color, frame.depth, labels)
