@@ -21,6 +21,8 @@ from loop.segmentation.network import DeepLab
 from loop.segmentation.photos import UInt8Array
 
 OPSET = 17
+FLOAT_LAYERS = 2
+"""Convolutions that int8 would hurt most, the stem and its first filter, whose few channels differ much in range."""
 INPUT, LOGITS, FEATURES = "image", "logits", "features"
 
 
@@ -89,8 +91,10 @@ def write_int8(network: DeepLab, path: Path, images: Iterable[UInt8Array]) -> No
         exported.write_bytes(float_graph(network))
         prepared = Path(folder) / "prepared.onnx"
         quant_pre_process(str(exported), str(prepared), skip_symbolic_shape=True)
+        convolutions = [node.name for node in onnx.load(prepared).graph.node if node.op_type == "Conv"]
         quantize_static(
             str(prepared), str(path), _Photos(images), quant_format=QuantFormat.QDQ, per_channel=True,
+            nodes_to_exclude=convolutions[:FLOAT_LAYERS],
             activation_type=QuantType.QUInt8, weight_type=QuantType.QInt8, calibrate_method=CalibrationMethod.MinMax,
             extra_options={"CalibMovingAverage": True},
         )  # fmt: skip
