@@ -102,7 +102,7 @@ def stress_command(
 def _ledger_table(entries: "list[LedgerEntry]") -> Table:
     table = Table()
     headings = ("query", "match", "seconds", "score", "verdict", "reason", "inliers", "fitness", "weight", "truth")
-    for heading in (*headings, "tension", "without it"):
+    for heading in (*headings, "gain, cm"):
         table.add_column(heading, justify="left" if heading in ("verdict", "reason", "truth") else "right")
     for e in entries:
         reason = "" if e.reason is None else e.reason
@@ -120,17 +120,16 @@ def _ledger_table(entries: "list[LedgerEntry]") -> Table:
             "" if e.fitness is None else f"{e.fitness:.2f}",
             "" if e.weight is None else f"{e.weight:.2f}",
             error,
-            "" if e.contribution is None else f"{e.contribution.tension:.1f}",
-            "" if e.contribution is None else _without(e.contribution),
+            "" if e.contribution is None else _gain(e.contribution),
         )
     return table
 
 
-def _without(contribution: "LoopContribution") -> str:
-    """What a loop's absence would do to the error, or else to the keyframes."""
+def _gain(contribution: "LoopContribution") -> str:
+    """By how much the ATE grows without a loop; without ground truth, how far the keyframes move."""
     if contribution.ate_gain_m is None:
-        return f"moved {100 * contribution.shift_m:.2f} cm"
-    return f"ATE {100 * contribution.ate_gain_m:+.2f} cm"
+        return f"moves {100 * contribution.shift_m:.2f}"
+    return f"{100 * contribution.ate_gain_m:+.2f}"
 
 
 COMMANDS = (
