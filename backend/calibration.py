@@ -30,7 +30,7 @@ NEIGHBOURHOOD = 3
 STRETCH = 20
 """Keyframes of odometry that a cycle through two loops may hold on either side."""
 MAX_CYCLES = 2000
-"""Cycles that are looked at; of more, every n-th."""
+"""Loops, and cycles through two of them, that are looked at; of more, every n-th."""
 
 
 def cycle_scale(chain: OdometryChain, loops: Sequence[Edge], limit: float) -> float:
@@ -39,6 +39,7 @@ def cycle_scale(chain: OdometryChain, loops: Sequence[Edge], limit: float) -> fl
     Such a cycle holds a stretch of odometry on either pass and nothing else. Loops between two rooms that look alike
     close it as true ones do, so that they cannot make odometry look worse than it is.
     """
+    loops = loops[:: max(-(-len(loops) // MAX_CYCLES), 1)]
     queries = np.array([loop.to_key for loop in loops], dtype=np.int64)
     matches = np.array([loop.from_key for loop in loops], dtype=np.int64)
     first, second = np.triu_indices(len(loops), 1)
