@@ -28,6 +28,8 @@ ALONE = 1.5
 """How many times the limit a pair must be off that alone sets two groups apart: one in a thousand is off by chance."""
 UNIT = 1.0
 """Mahalanobis distances below this are all alike."""
+BLOCK = 50_000
+"""Pairs that are worked on at a time."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -87,8 +89,7 @@ def _ambiguous(chain: OdometryChain, loops: Sequence[Edge], distances: FloatArra
     first, second, both = _sharing_a_place(loops)
     if not len(first):
         return withheld
-    left, own, odometry, joined = cycles(chain, loops, first, second)
-    off = np.where(joined, np.sqrt(squared_mahalanobis(left, own + odometry)), 0.0)
+    off = _openness(chain, loops, first, second)
     closing = both & (off <= limit)
     group = np.zeros(len(loops), dtype=np.int64)
     members = connected(range(len(loops)), zip(first[closing].tolist(), second[closing].tolist(), strict=True))
@@ -106,6 +107,16 @@ def _ambiguous(chain: OdometryChain, loops: Sequence[Edge], distances: FloatArra
                 withheld[group == mine] = True
         withheld |= _third_side(loops, first[shared], second[shared])
     return withheld
+
+
+def _openness(chain: OdometryChain, loops: Sequence[Edge], first: IntArray, second: IntArray) -> FloatArray:
+    """Mahalanobis distance (P,) that the cycle through each pair of loops is from closing; 0 where there is none."""
+    off = np.zeros(len(first))
+    for begin in range(0, len(first), BLOCK):
+        block = slice(begin, begin + BLOCK)
+        left, own, odometry, joined = cycles(chain, loops, first[block], second[block])
+        off[block] = np.where(joined, np.sqrt(squared_mahalanobis(left, own + odometry)), 0.0)
+    return off
 
 
 def _third_side(loops: Sequence[Edge], first: IntArray, second: IntArray) -> BoolArray:
