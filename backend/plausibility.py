@@ -79,7 +79,8 @@ def distances_from_odometry(chain: OdometryChain, loops: Sequence[Edge]) -> tupl
     T, covariance, joined = chain.relative([e.from_key for e in loops], [e.to_key for e in loops])
     left = deviations(invert(np.stack([loop.T_from_to for loop in loops])) @ T)
     own = np.stack([loop.covariance for loop in loops])
-    distances: FloatArray = np.where(joined, np.sqrt(squared_mahalanobis(left, own + covariance)), 0.0)
+    distances = np.zeros(len(loops))
+    distances[joined] = np.sqrt(squared_mahalanobis(left[joined], (own + covariance)[joined]))
     return distances, joined
 
 
