@@ -1,5 +1,6 @@
 """Tables, progress bars and complaints."""
 
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
@@ -13,7 +14,9 @@ if TYPE_CHECKING:
     from semslam.metrics import LoopMetrics, Metrics
     from semslam.slam import FrameState
 
-out = Console()
+PIPED_WIDTH = 120
+# A file or a pipe has no width of its own; 80 columns would fold the wider tables.
+out = Console(width=None if sys.stdout.isatty() else PIPED_WIDTH)
 err = Console(stderr=True)
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
+from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from semslam.cli import options
@@ -100,7 +101,7 @@ def stress_command(
 
 
 def _ledger_table(entries: "list[LedgerEntry]") -> Table:
-    table = Table()
+    table = Table(box=SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False)
     headings = ("query", "match", "seconds", "score", "verdict", "reason", "inliers", "fitness", "weight", "truth")
     for heading in (*headings, "gain, cm"):
         table.add_column(heading, justify="left" if heading in ("verdict", "reason", "truth") else "right")
