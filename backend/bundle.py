@@ -5,7 +5,7 @@ does (Mur-Artal and Tardos, "ORB-SLAM2", T-RO 2017, section III-A).
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import gtsam
 import numpy as np
@@ -85,7 +85,7 @@ def adjust(
     for landmark, point in enumerate(sightings.points):
         values.insert(gtsam.symbol("l", landmark), point)
     factors = _observation_factors(sightings, intrinsics, config)
-    held = _pose_factors(poses, edges)
+    held = _pose_factors(poses, edges, config.sighting_share)
     kept = np.ones(len(sightings), dtype=bool)
     rounds = []
     for _ in range(config.rounds):
@@ -151,12 +151,15 @@ def _noises(sigma: float, config: BundleConfig) -> tuple[gtsam.noiseModel.Robust
     return gtsam.noiseModel.Robust.Create(kernel, stereo), gtsam.noiseModel.Robust.Create(kernel, mono)
 
 
-def _pose_factors(poses: Mapping[int, FloatArray], edges: Sequence[Edge]) -> gtsam.NonlinearFactorGraph:
+def _pose_factors(
+    poses: Mapping[int, FloatArray], edges: Sequence[Edge], sighting_share: float
+) -> gtsam.NonlinearFactorGraph:
+    """The edges, held as much tighter as sightings are to count less: so outliers stay a matter of pixels."""
     graph = gtsam.NonlinearFactorGraph()
     for index, (key, T_world_cam) in enumerate(sorted(poses.items())):
         graph.add(prior_factor(key, T_world_cam, FLOATING_SIGMA if index else ANCHOR_SIGMA))
     for edge in edges:
-        graph.add(between_factor(edge))
+        graph.add(between_factor(replace(edge, covariance=edge.covariance * sighting_share)))
     return graph
 
 

@@ -317,6 +317,9 @@ class BundleConfig(Section):
     iterations: int = Field(5, gt=0, description="Levenberg-Marquardt steps of a round at the most")
     max_observations: int = Field(250, gt=0, description="observations a keyframe needs; more are mostly left out")
     pixel_sigma: float = Field(1.0, gt=0, description="pixels; error of a keypoint")
+    sighting_share: float = Field(
+        0.0625, gt=0, le=1, description="information of a sighting against an independent one; neighbours repeat errors"
+    )
     disparity_weight: float = Field(0.5, gt=0, description="weight of depth, as a virtual disparity, against a pixel")
     baseline: float = Field(0.08, gt=0, description="metres between the virtual stereo pair's cameras")
     outlier: float = Field(2.8, gt=0, description="whitened reprojection error at which an observation is dropped")
