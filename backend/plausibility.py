@@ -116,7 +116,7 @@ def _openness(chain: OdometryChain, loops: Sequence[Edge], first: IntArray, seco
     for begin in range(0, len(first), BLOCK):
         block = slice(begin, begin + BLOCK)
         left, own, odometry, joined = cycles(chain, loops, first[block], second[block])
-        off[block] = np.where(joined, np.sqrt(squared_mahalanobis(left, own + odometry)), 0.0)
+        off[block][joined] = np.sqrt(squared_mahalanobis(left[joined], (own + odometry)[joined]))
     return off
 
 

@@ -118,12 +118,14 @@ def _ledger(dataset: Dataset, slam: SlamResult, config: Config) -> tuple[LedgerE
 
 
 def _graph_verdict(verdict: LoopVerdict, contribution: LoopContribution | None, config: BackendConfig) -> GraphVerdict:
-    """The verdict with the figure that failed: the residual, or before that the distance from odometry alone."""
-    if verdict.reason is None:
-        return GraphVerdict(verdict.weight, verdict.accepted, contribution)
-    drift = (verdict.drift, config.drift_slack * config.max_residual)
-    figure, limit = (verdict.residual, config.max_residual) if verdict.reason is RejectionReason.OUTLIER else drift
-    return GraphVerdict(verdict.weight, verdict.accepted, contribution, verdict.reason.value, figure, limit)
+    """The verdict with the figure that failed; an ambiguous loop fails against other loops, by no figure of its own."""
+    figure, limit = None, None
+    if verdict.reason is RejectionReason.OUTLIER:
+        figure, limit = verdict.residual, config.max_residual
+    elif verdict.reason is RejectionReason.INCONSISTENT:
+        figure, limit = verdict.drift, config.drift_slack * config.max_residual
+    reason = None if verdict.reason is None else verdict.reason.value
+    return GraphVerdict(verdict.weight, verdict.accepted, contribution, reason, figure, limit)
 
 
 def _truths(dataset: Dataset, slam: SlamResult) -> Sequence[JudgedLoop | None]:

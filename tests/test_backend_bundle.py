@@ -113,6 +113,23 @@ def test_keyframes_without_landmarks_keep_to_their_odometry():
     assert error(result.poses, truth) < 0.02
 
 
+def test_sightings_that_repeat_their_errors_do_not_outweigh_the_edges():
+    """Each landmark is off by the same pixels in every view, as a corner is that a pyramid displaces."""
+    truth, points = world()
+    rng = np.random.default_rng(6)
+    offsets = rng.normal(size=(*points.shape[:1], 2)) * 2.0
+    seen = {
+        key: Observations(one.landmarks, (one.pixels + offsets[one.landmarks]).astype(np.float32), one.depths)
+        for key, one in look(truth, points, rng).items()
+    }
+    edges = measure(truth, [(k, k + 1) for k in range(15)], rng, 0.02)
+    start = dict(enumerate(truth))
+    alone, shared = (
+        adjust(start, seen, CAMERA, BundleConfig(sighting_share=share), edges).poses for share in (1.0, 0.0625)
+    )
+    assert error(shared, truth) < 0.7 * error(alone, truth)
+
+
 def test_two_halves_that_share_no_landmark_are_held_together_by_a_loop():
     truth, points = world(24)
     rng = np.random.default_rng(6)
