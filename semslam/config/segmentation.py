@@ -1,0 +1,44 @@
+"""Settings of the segmenter and of its training."""
+
+from pathlib import Path
+from typing import Literal
+
+from pydantic import Field
+
+from semslam.config.section import Section
+
+
+class SegmentationConfig(Section):
+    """Which segmenter runs, and how."""
+
+    name: str = Field("onnx", description="registered segmenter")
+    weights: Path | None = Field(None, description="checkpoint; none = the shipped one")
+    width: int = Field(320, gt=0, description="input width in pixels")
+    height: int = Field(240, gt=0, description="input height in pixels")
+    threads: int = Field(1, gt=0, description="inference threads")
+    precision: Literal["int8", "float32"] = Field("int8", description="arithmetic of the shipped network")
+    min_confidence: float = Field(0.0, ge=0, lt=1, description="below it a pixel becomes void; 0 = never")
+    labels_dir: Path | None = Field(None, description="folder of label images for the segmenter 'folder'")
+    cache_dir: Path | None = Field(None, description="where segmentations are cached by content; none = no cache")
+
+
+class TrainingConfig(Section):
+    """How the segmentation network is trained; the size of its input is the segmenter's."""
+
+    start: Path | None = Field(None, description="weights to start from: ADE20K state dict or own checkpoint")
+    epochs: int = Field(60, gt=0, description="passes over the labelled photos")
+    batch: int = Field(8, gt=1, description="views in one step")
+    rate: float = Field(1e-3, gt=0, description="peak learning rate of decoder and head")
+    encoder_rate: float = Field(0.25, ge=0, description="learning rate of the encoder as a share of the peak")
+    weight_decay: float = Field(0.02, ge=0, description="decoupled weight decay")
+    freeze_early: bool = Field(False, description="leave the encoder's stem and first blocks, to 1/4, as they are")
+    freeze_norms: bool = Field(False, description="keep the batch norms' statistics as they were at the start")
+    warmup: float = Field(0.08, ge=0, lt=1, description="share of the steps in which the rate climbs")
+    average: float = Field(0.998, ge=0, lt=1, description="decay of the weight average that is kept")
+    strong_share: float = Field(0.0, ge=0, le=1, description="share of views taken close, rolled, blurred, badly lit")
+    rare_share: float = Field(0.0, ge=0, le=1, description="share of views drawn by class, every class as often")
+    unlabelled: Path | None = Field(None, description="folder of photos without labels, for teachers to judge")
+    teachers: tuple[Path, ...] = Field((), description="weights of the networks that judge them together")
+    unlabelled_share: float = Field(0.4, ge=0, lt=1, description="share of views drawn from those photos")
+    threads: int = Field(1, gt=0, description="training threads")
+    save_every: float = Field(60.0, gt=0, description="seconds between checkpoints")
