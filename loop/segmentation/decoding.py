@@ -40,7 +40,9 @@ def decode(logits: Float32Array, size: tuple[int, int], min_confidence: float = 
     """Labels and confidence of the network's answer.
 
     The logits are enlarged to four times their size (the network's input), the labels from there to ``size`` by
-    nearest neighbour. The confidence is the winner's softmax probability, taken before the enlargement.
+    nearest neighbour. A label that wins in no cell of the answer is not looked for between cells: in thin seams, where
+    two others trade places, it would be a third that nothing speaks for. The confidence is the winner's softmax
+    probability, taken before the enlargement.
 
     Args:
         logits: (40, h, w) float32.
@@ -48,16 +50,16 @@ def decode(logits: Float32Array, size: tuple[int, int], min_confidence: float = 
         min_confidence: below it a pixel becomes void.
     """
     width, height = logits.shape[2] * 4, logits.shape[1] * 4
-    best = cv2.resize(logits[0], (width, height))
-    labels = np.ones((height, width), dtype=np.uint8)
-    stamp = np.empty_like(labels)
+    top = logits.max(axis=0)
+    first, *others = np.unique(logits.argmax(axis=0))
+    labels = np.full((height, width), first + 1, dtype=np.uint8)
+    stamp, best = np.empty_like(labels), cv2.resize(logits[first], (width, height))
     # Plane by plane all stays in the processor's cache: five times faster than an argmax over the stack.
-    for label, plane in enumerate(logits[1:], start=2):
-        enlarged = cv2.resize(plane, (width, height))
-        stamp[:] = label
+    for channel in others:
+        enlarged = cv2.resize(logits[channel], (width, height))
+        stamp[:] = channel + 1
         cv2.copyTo(stamp, cv2.compare(enlarged, best, cv2.CMP_GT), labels)
         cv2.max(enlarged, best, dst=best)
-    top = logits.max(axis=0)
     coarse = 1.0 / np.exp(logits - top).sum(axis=0)
     confidence = np.asarray(cv2.resize(coarse, size), dtype=np.float32)
     full = np.asarray(cv2.resize(labels, size, interpolation=cv2.INTER_NEAREST), dtype=np.uint8)
