@@ -1,14 +1,16 @@
 """Segmentation: accuracy against time, and how steady labels are from frame to frame.
 
     python benchmarks/segmentation.py speed  --data ../shared/data/nyuv2
+    python benchmarks/segmentation.py teachers --data ../shared/data/nyuv2 --teachers A/weights.pt B/weights.pt
     python benchmarks/segmentation.py steady --sequence ../shared/data/redkitchen
 
-Prints rows of Markdown tables. Times are medians for one image on one thread, resizing and decoding included.
+Prints rows of Markdown tables. Times are medians of the processor's time for one photo of the input's size, decoding
+included.
 """
 
 import argparse
 import time
-from collections.abc import Callable
+from collections.abc import Sequence
 from pathlib import Path
 
 import cv2
@@ -16,13 +18,15 @@ import numpy as np
 import torch
 
 from loop.segmentation.build import build_segmenter
-from loop.segmentation.classes import GROUP_OF_LABEL
-from loop.segmentation.evaluation import evaluate
+from loop.segmentation.classes import CLASS_COUNT, GROUP_OF_LABEL
+from loop.segmentation.decoding import shrink
+from loop.segmentation.evaluation import confusion_matrix, evaluate, score
 from loop.segmentation.export import float_graph
 from loop.segmentation.network import build_mobilenet_deeplab, count_multiply_adds, count_parameters
-from loop.segmentation.onnx import OnnxSegmenter
-from loop.segmentation.photos import list_names, read_photo
+from loop.segmentation.onnx import OnnxSegmenter, load_graph
+from loop.segmentation.photos import UInt8Array, list_names, read_photo
 from loop.segmentation.segmenter import Segmenter
+from loop.segmentation.self_training import Teacher
 from loop.segmentation.xception import build_xception_deeplab
 from semslam.config import load_config
 from semslam.datasets import open_dataset
@@ -35,36 +39,60 @@ WAYS = (("onnx", "int8"), ("onnx", "float32"), ("torch", "float32"))
 DEPTH_TOLERANCE = 0.05
 
 
-def median_ms(action: Callable[[], object], count: int) -> float:
-    """Median milliseconds of ``count`` runs after two to warm up."""
-    times = []
-    for _ in range(count + 2):
-        start = time.perf_counter()
-        action()
-        times.append(time.perf_counter() - start)
-    return 1e3 * float(np.median(times[2:]))
+def median_ms(segmenters: Sequence[Segmenter], photo: UInt8Array, rounds: int) -> list[float]:
+    """Median milliseconds of processor time of each, all taking turns so that a busy machine slows all alike."""
+    times = np.zeros((rounds + 1, len(segmenters)))
+    for turn in times:
+        for i, segmenter in enumerate(segmenters):
+            start = time.process_time()
+            segmenter.segment(photo)
+            turn[i] = time.process_time() - start
+    medians: list[float] = (1e3 * np.median(times[1:], axis=0)).tolist()  # the first round warms up
+    return medians
 
 
-def speed_table(data: Path, count: int, threads: int) -> None:
+def speed_table(data: Path, rounds: int, threads: int) -> None:
     """Accuracy and time of each way and size."""
     torch.set_num_threads(threads)
-    names = list_names(data, "val.txt")
-    photo = read_photo(data, names[0]).color
+    photo = read_photo(data, list_names(data, "val.txt")[0]).color
+    graph = float_graph(build_xception_deeplab())
     print("| network | way | input | mIoU | pixel accuracy | ms |\n|---|---|---|---|---|---|")
     for size in SIZES:
-        for way, precision in WAYS:
-            settings = {"name": way, "precision": precision, "width": size[0], "height": size[1], "threads": threads}
-            segmenter = build_segmenter(load_config(overrides={"segmentation": settings}))
-            ms = median_ms(lambda s=segmenter: s.segment(photo), count)  # type: ignore[misc]
+        ways = [way_of(name, precision, size, threads) for name, precision in WAYS]
+        given = shrink(photo, size)
+        *times, xception = median_ms([*ways, OnnxSegmenter(graph, size, threads)], given, rounds)
+        for (name, precision), segmenter, ms in zip(WAYS, ways, times, strict=True):
             # PyTorch gives ONNX float32's labels (a test sees to it), so it is not scored again.
-            result = evaluate(segmenter, data, size=None if size == (640, 480) else size) if way == "onnx" else None
+            result = evaluate(segmenter, data, size=None if size == SIZES[-1] else size) if name == "onnx" else None
             marks = f"{result.miou:.3f} | {result.pixel_accuracy:.3f}" if result else "as above | as above"
-            print(f"| MobileNetV2 | {way} {precision} | {size[0]}x{size[1]} | {marks} | {ms:.1f} |", flush=True)
-    graph = float_graph(build_xception_deeplab())
-    for size in SIZES[:1]:
-        xception = OnnxSegmenter(graph, size, threads)
-        ms = median_ms(lambda s=xception: s.segment(photo), max(3, count // 4))  # type: ignore[misc]
-        print(f"| Xception-65 | onnx float32 | {size[0]}x{size[1]} | untrained | untrained | {ms:.1f} |")
+            print(f"| MobileNetV2 | {name} {precision} | {size[0]}x{size[1]} | {marks} | {ms:.1f} |", flush=True)
+        print(f"| Xception-65 | onnx float32 | {size[0]}x{size[1]} | untrained | untrained | {xception:.1f} |")
+
+
+def way_of(name: str, precision: str, size: tuple[int, int], threads: int) -> Segmenter:
+    """The shipped network by one inference engine."""
+    settings = {"name": name, "precision": precision, "width": size[0], "height": size[1], "threads": threads}
+    return build_segmenter(load_config(overrides={"segmentation": settings}))
+
+
+def teachers_table(data: Path, weights: Sequence[Path]) -> None:
+    """What networks score together, as teachers: at two sizes and mirrored, each alone and the first n averaged."""
+    teachers = [Teacher([load_graph(path, "float32")]) for path in weights]
+    groups = [*({i} for i in range(len(weights))), *(set(range(n)) for n in range(2, len(weights) + 1))]
+    confusions = np.zeros((len(groups), CLASS_COUNT + 1, CLASS_COUNT + 1), dtype=np.int64)
+    for name in list_names(data, "val.txt"):
+        photo = read_photo(data, name)
+        truth = cv2.resize(photo.labels, SIZES[0], interpolation=cv2.INTER_NEAREST).astype(np.uint8)
+        beliefs = [teacher.probabilities(photo.color) for teacher in teachers]
+        for i, group in enumerate(groups):
+            mean = np.mean([beliefs[member] for member in group], axis=0)
+            labels = cv2.resize(mean, SIZES[0]).argmax(axis=2).astype(np.uint8) + np.uint8(1)
+            confusions[i] += confusion_matrix(truth, labels)
+    print("| teachers | mIoU | pixel accuracy |\n|---|---|---|")
+    for confusion, group in zip(confusions, groups, strict=True):
+        result = score(confusion)
+        members = ", ".join(str(weights[i]) for i in sorted(group))
+        print(f"| {members} | {result.miou:.4f} | {result.pixel_accuracy:.4f} |")
 
 
 def size_table() -> None:
@@ -138,20 +166,23 @@ def set_overlap(a: LabelMap, b: LabelMap, share: float = 0.01) -> float:
 def main() -> None:
     """Read the command line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("table", choices=["speed", "size", "steady"])
+    parser.add_argument("table", choices=["speed", "size", "teachers", "steady"])
     parser.add_argument("--data", type=Path, default=Path("../shared/data/nyuv2"))
     parser.add_argument("--sequence", type=Path, default=Path("../shared/data/redkitchen"))
     parser.add_argument("--weights", type=Path, help="other weights for the table 'steady'")
+    parser.add_argument("--teachers", type=Path, nargs="+", default=[], help="weights for the table 'teachers'")
     parser.add_argument("--gap", type=int, default=5)
     parser.add_argument("--stride", type=int, default=20)
-    parser.add_argument("--count", type=int, default=30)
+    parser.add_argument("--rounds", type=int, default=22)
     parser.add_argument("--threads", type=int, default=1)
     arguments = parser.parse_args()
     cv2.setNumThreads(arguments.threads)
     if arguments.table == "speed":
-        speed_table(arguments.data, arguments.count, arguments.threads)
+        speed_table(arguments.data, arguments.rounds, arguments.threads)
     elif arguments.table == "size":
         size_table()
+    elif arguments.table == "teachers":
+        teachers_table(arguments.data, arguments.teachers)
     else:
         settings = {"weights": str(arguments.weights)} if arguments.weights else {}
         segmenters = {"onnx": build_segmenter(load_config(overrides={"segmentation": settings}))}
