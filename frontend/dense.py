@@ -8,37 +8,17 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from frontend.reference import ReferenceTracker, Registration
+from frontend.reference import ReferenceOdometry, Registration
 from semslam.camera import Intrinsics
 from semslam.config import Config, DenseConfig
 from semslam.geometry import adjoint, invert, is_rigid
 from semslam.threads import one_open3d_thread
-from semslam.types import FloatArray, Frame, Motion
+from semslam.types import FloatArray, Frame
 
 MIN_SIZE = 32
 """Pixels; smaller images have no pyramid."""
 MEET = 0.05
 """Metres within which two depths are of one surface."""
-
-
-class DenseOdometry:
-    """Registers each frame to the one before by colour and depth (Park et al., ICCV 2017). Drifts: it has no map."""
-
-    def __init__(self, config: Config) -> None:
-        self._tracker = ReferenceTracker(DenseRegistrar(config.dense))
-
-    @classmethod
-    def from_config(cls, config: Config) -> Self:
-        """Build it from the settings."""
-        return cls(config)
-
-    def track(self, frame: Frame) -> Motion:
-        """Motion since the previous frame; LOST where there is no depth or the images do not meet.
-
-        Raises:
-            DatasetError: the frame's size does not fit its intrinsics.
-        """
-        return self._tracker.track(frame)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -104,6 +84,18 @@ class DenseRegistrar:
         covariance = carry @ np.linalg.inv(information) @ carry.T * variance
         inliers = round(found.fitness * current.intrinsics.width * current.intrinsics.height)
         return Registration(T, covariance, inliers, found.fitness < 2 * self._config.min_fitness)
+
+
+class DenseOdometry(ReferenceOdometry[DenseView]):
+    """Registers each frame to the one before by colour and depth (Park et al., ICCV 2017). Drifts: it has no map.
+
+    LOST where there is no depth or the images do not meet.
+    """
+
+    @classmethod
+    def from_config(cls, config: Config) -> Self:
+        """Build it from the settings."""
+        return cls(DenseRegistrar(config.dense))
 
 
 def _undistort(

@@ -5,30 +5,9 @@ from typing import Self
 
 from frontend.dense import DenseRegistrar, DenseView
 from frontend.feature import FeatureRegistrar, FeatureView
-from frontend.reference import Reach, ReferenceTracker, Registration
+from frontend.reference import Reach, ReferenceOdometry, Registration
 from semslam.config import Config
-from semslam.types import FloatArray, Frame, Motion
-
-
-class DenseKeyframeOdometry:
-    """Registers frames to a keyframe by colour and depth, so that errors add up by keyframes and not by frames."""
-
-    def __init__(self, config: Config) -> None:
-        reach = Reach(config.dense.keyframe_translation, config.dense.keyframe_rotation)
-        self._tracker = ReferenceTracker(_Registrar(config), reach)
-
-    @classmethod
-    def from_config(cls, config: Config) -> Self:
-        """Build it from the settings."""
-        return cls(config)
-
-    def track(self, frame: Frame) -> Motion:
-        """Motion since the previous frame; LOST where there is no depth or the images do not meet.
-
-        Raises:
-            DatasetError: the frame's size does not fit its intrinsics.
-        """
-        return self._tracker.track(frame)
+from semslam.types import FloatArray, Frame
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,3 +30,15 @@ class _Registrar:
             matched = self._features.register(reference.features, current.features, T_ref_cam)
             T_ref_cam = T_ref_cam if matched is None else matched.T_ref_cam
         return self._dense.register(reference.dense, current.dense, T_ref_cam)
+
+
+class DenseKeyframeOdometry(ReferenceOdometry[_View]):
+    """Registers frames to a keyframe by colour and depth, so that errors add up by keyframes and not by frames.
+
+    LOST where there is no depth or the images do not meet.
+    """
+
+    @classmethod
+    def from_config(cls, config: Config) -> Self:
+        """Build it from the settings."""
+        return cls(_Registrar(config), Reach(config.dense.keyframe_translation, config.dense.keyframe_rotation))

@@ -5,30 +5,10 @@ from typing import Self
 
 import numpy as np
 
-from frontend.reference import ReferenceTracker, Registration
+from frontend.reference import ReferenceOdometry, Registration
 from semslam.config import Config
 from semslam.features import FeatureExtractor, match_descriptors, solve_pnp
-from semslam.types import Features, FloatArray, Frame, Intrinsics, Motion
-
-
-class FeatureOdometry:
-    """Matches ORB features with the previous frame's and solves PnP among wrong matches. Drifts: it has no map."""
-
-    def __init__(self, config: Config) -> None:
-        self._tracker = ReferenceTracker(FeatureRegistrar(config))
-
-    @classmethod
-    def from_config(cls, config: Config) -> Self:
-        """Build it from the settings."""
-        return cls(config)
-
-    def track(self, frame: Frame) -> Motion:
-        """Motion since the previous frame; LOST where too few matches agree on one.
-
-        Raises:
-            DatasetError: the frame's size does not fit its intrinsics.
-        """
-        return self._tracker.track(frame)
+from semslam.types import Features, FloatArray, Frame, Intrinsics
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,3 +50,15 @@ class FeatureRegistrar:
             return None
         covariance = found.covariance * self._config.covariance_scale
         return Registration(found.T_ref_cam, covariance, inliers, inliers < 2 * self._config.min_inliers)
+
+
+class FeatureOdometry(ReferenceOdometry[FeatureView]):
+    """Matches ORB features with the previous frame's and solves PnP among wrong matches. Drifts: it has no map.
+
+    LOST where too few matches agree on a motion.
+    """
+
+    @classmethod
+    def from_config(cls, config: Config) -> Self:
+        """Build it from the settings."""
+        return cls(FeatureRegistrar(config))

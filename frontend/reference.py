@@ -64,7 +64,7 @@ class Reach:
 FRAME_TO_FRAME = Reach(0.0, 0.0)
 
 
-class ReferenceTracker(Generic[ViewT]):
+class ReferenceOdometry(Generic[ViewT]):
     """Tracks every frame against a reference: the last one that could be tracked, or one from a little before.
 
     While frames cannot be tracked the motion is predicted and the reference is kept, so that a short black-out is
