@@ -5,7 +5,9 @@ from collections.abc import Iterable, Mapping
 import gtsam
 import numpy as np
 
+from backend.checks import checked_covariance, checked_pose
 from backend.products import Edge
+from semslam.errors import GraphError
 from semslam.types import FloatArray
 
 ANCHOR_SIGMA = 1e-4
@@ -36,6 +38,28 @@ def between_factor(
     if kernel is not None:
         noise = gtsam.noiseModel.Robust.Create(kernel, noise)
     return gtsam.BetweenFactorPose3(edge.from_key, edge.to_key, gtsam.Pose3(edge.T_from_to), noise)
+
+
+def read_edges(graph: gtsam.NonlinearFactorGraph) -> list[Edge]:
+    """The between-factors of two poses in a graph, as edges; other factors are passed over.
+
+    Covariances are those of the Gaussian inside a robust noise model.
+
+    Raises:
+        GraphError: a measurement is not a finite rigid transform, or a noise model has no covariance.
+    """
+    edges = []
+    for factor in (graph.at(index) for index in range(graph.size())):
+        if not isinstance(factor, gtsam.BetweenFactorPose3):
+            continue
+        from_key, to_key = factor.keys()
+        what, noise = f"The edge from {from_key} to {to_key}", factor.noiseModel()
+        noise = noise.noise() if isinstance(noise, gtsam.noiseModel.Robust) else noise
+        if not isinstance(noise, gtsam.noiseModel.Gaussian):
+            raise GraphError(f"{what} has no covariance.")
+        T_from_to = checked_pose(factor.measured().matrix(), what)
+        edges.append(Edge(from_key, to_key, T_from_to, checked_covariance(noise.covariance(), what)))
+    return edges
 
 
 def make_values(poses: Mapping[int, FloatArray]) -> gtsam.Values:

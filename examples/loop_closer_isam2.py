@@ -22,38 +22,50 @@ def main(detector: str | LoopDetector = "thumbnail") -> tuple[float, float]:
     """Run over the room; returns the last camera's error in metres by odometry alone and with loops."""
     truth = [gtsam.Pose3(T) for T in poses()]
     closer = LoopCloser(CAMERA, detector)
-    isam = gtsam.ISAM2()
-    odometry = truth[0]
-    estimate = truth[0]
+    isam, followed = gtsam.ISAM2(), Followed(closer)
+    measured = gtsam.NonlinearFactorGraph()  # this program's own odometry
+    odometry = estimate = truth[0]
     for i, frame in enumerate(frames(poses())):
         graph, values = gtsam.NonlinearFactorGraph(), gtsam.Values()
         if i == 0:
             graph.add(gtsam.PriorFactorPose3(X(0), truth[0], ANCHOR_NOISE))
         else:
-            motion = truth[i - 1].between(truth[i]).compose(DRIFT)  # this program's own odometry
-            odometry = odometry.compose(motion)
-            estimate = estimate.compose(motion)
-            graph.add(gtsam.BetweenFactorPose3(X(i - 1), X(i), motion, ODOMETRY_NOISE))
+            motion = truth[i - 1].between(truth[i]).compose(DRIFT)
+            odometry, estimate = odometry.compose(motion), estimate.compose(motion)
+            step = gtsam.BetweenFactorPose3(X(i - 1), X(i), motion, ODOMETRY_NOISE)
+            graph.add(step)
+            measured.add(step)
         values.insert(X(i), estimate)
-        loops = closer.add(X(i), frame.color, frame.depth, estimate.matrix(), frame.timestamp)
-        for factor in loops:
-            graph.add(factor)
-        slots = isam.update(graph, values).getNewFactorsIndices()
-        drop_contradicted(isam, closer, dict(zip(loops, slots[graph.size() - len(loops) :], strict=True)))
+        isam.update(graph, values)
+        if closer.add(X(i), frame.color, frame.depth, estimate.matrix(), frame.timestamp):
+            followed.revise(isam, measured)
         estimate = isam.calculateEstimatePose3(X(i))
     errors = [float(np.linalg.norm(pose.translation() - truth[-1].translation())) for pose in (odometry, estimate)]
-    print(f"{len(closer.closures)} loops; last camera off by {errors[0]:.3f} m without them, {errors[1]:.3f} m with")
+    print(f"{len(followed)} loops; last camera off by {errors[0]:.3f} m without them, {errors[1]:.3f} m with")
     return errors[0], errors[1]
 
 
-def drop_contradicted(isam: gtsam.ISAM2, closer: LoopCloser, fresh: dict[gtsam.BetweenFactorPose3, int]) -> None:
-    """Take the newest loops out of the graph again where it contradicts them."""
-    if not fresh:
-        return
-    contradicted = {closure.factor for closure in closer.contradicted(isam.calculateEstimate())}
-    slots = [slot for factor, slot in fresh.items() if factor in contradicted]
-    if slots:
-        isam.update(gtsam.NonlinearFactorGraph(), gtsam.Values(), slots)
+class Followed:
+    """The loops that iSAM2 follows, each with its slot there."""
+
+    def __init__(self, closer: LoopCloser) -> None:
+        self._closer = closer
+        self._slots: dict[gtsam.BetweenFactorPose3, int] = {}
+
+    def __len__(self) -> int:
+        return len(self._slots)
+
+    def revise(self, isam: gtsam.ISAM2, odometry: gtsam.NonlinearFactorGraph) -> None:
+        """Put in what is believed by now, and take out what is not believed any more."""
+        believed = [closure.factor for closure in self._closer.believed(odometry)]
+        fresh = [factor for factor in believed if factor not in self._slots]
+        gone = [self._slots.pop(factor) for factor in set(self._slots).difference(believed)]
+        if fresh or gone:
+            graph = gtsam.NonlinearFactorGraph()
+            for factor in fresh:
+                graph.add(factor)
+            result = isam.update(graph, gtsam.Values(), sorted(gone))
+            self._slots.update(zip(fresh, result.getNewFactorsIndices(), strict=True))
 
 
 if __name__ == "__main__":

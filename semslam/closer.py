@@ -1,14 +1,16 @@
 """Loop closing for somebody else's GTSAM program: an RGB-D keyframe in, between-factors out."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import gtsam
 import numpy as np
 import numpy.typing as npt
 
+from backend.chain import OdometryChain
 from backend.checks import checked_pose
-from backend.factors import between_factor
+from backend.factors import between_factor, read_edges
+from backend.pose_graph import PoseGraph
 from backend.products import Edge, loop_edge
 from frontend.keyframes import make_keyframe
 from loop.detector import LoopDetector
@@ -19,7 +21,7 @@ from semslam import plugins
 from semslam.config import Config
 from semslam.errors import DatasetError, GraphError
 from semslam.features import FeatureExtractor
-from semslam.geometry import adjoint, invert
+from semslam.geometry import FloatArray, adjoint, invert
 from semslam.types import Frame, Intrinsics, Keyframe, KeyframeView, LabelMap, LoopConstraint
 
 Noise = Callable[[LoopConstraint], gtsam.noiseModel.Base]
@@ -46,7 +48,8 @@ class LoopCloser:
     """Finds and verifies loop closures and returns them as ``gtsam.BetweenFactorPose3``.
 
     Everything happens in the caller's thread, within ``add``. The closer never touches the caller's graph: what
-    enters it, and what is taken out again, is the caller's to decide (see ``contradicted``).
+    enters it, and what is taken out again, is the caller's to decide. Two rooms that look and measure alike pass every
+    test on two views: only odometry tells them apart, so ask ``believed`` before a loop is followed for good.
 
     Args:
         intrinsics: the camera of all images.
@@ -147,8 +150,49 @@ class LoopCloser:
         self._closures += closures
         return [closure.factor for closure in closures]
 
+    def believed(self, graph: gtsam.NonlinearFactorGraph) -> list[Closure]:
+        """Closures that semslam's own pose graph would follow, given the caller's odometry; the others are doubtful.
+
+        They lie within what odometry can have drifted, no clearly better founded one puts the same view elsewhere,
+        and they fit one another. A closure that is doubtful now may be believed once others bear it out, and the
+        reverse. Each call optimises a graph of the closer's keyframes by the settings ``backend``.
+
+        Args:
+            graph: holds the odometry: between-factors of keys that follow one another, of which not all need be
+                keyframes of the closer. Keys ascend with time, as ``gtsam.symbol`` makes them; factors of other
+                keys, such as loops, are passed over. Keyframes that odometry does not join are taken for different
+                maps, and loops between those are not screened.
+
+        Raises:
+            GraphError: a factor is malformed, or the optimiser failed.
+        """
+        if not self._closures:
+            return []
+        verdicts = self._own_graph(read_edges(graph)).optimize().verdicts
+        return [closure for closure, verdict in zip(self._closures, verdicts, strict=True) if verdict.accepted]
+
+    def _own_graph(self, edges: list[Edge]) -> PoseGraph:
+        """The closer's keyframes, counted from 0, with the odometry between them and all closures."""
+        known = {key for edge in edges for key in (edge.from_key, edge.to_key)}
+        chain = OdometryChain(known.union(self._keys), edges)
+        steps = zip(*chain.relative(self._keys[:-1], self._keys[1:]), strict=True)
+        graph = PoseGraph(self._config.backend)
+        T: FloatArray = np.eye(4)
+        graph.add_keyframe(0, T)
+        for number, (T_last_this, covariance, joined) in enumerate(steps, 1):
+            T = T @ T_last_this if joined else np.eye(4)
+            graph.add_keyframe(number, T)
+            if joined:
+                graph.add_odometry(number - 1, number, T_last_this, covariance)
+        for closure in self._closures:
+            edge = self._edge(closure.constraint, closure.match_key, closure.query_key)
+            graph.add_loop(replace(closure.constraint, T_match_query=edge.T_from_to, covariance=edge.covariance))
+        return graph
+
     def contradicted(self, values: gtsam.Values) -> list[Closure]:
         """Closures that lie farther from these estimates than a true one should (``backend.max_residual``).
+
+        Quick, but an estimate that follows false closures agrees with them: see ``believed``.
 
         Args:
             values: the caller's current estimate; closures whose keys it lacks are passed over.

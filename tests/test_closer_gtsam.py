@@ -121,6 +121,74 @@ def test_closures_that_an_estimate_contradicts(room):
     assert closer.contradicted(values) == list(closer.closures)
 
 
+class TwoPlaces(FirstAgain):
+    """Proposes the keyframes ten and twenty earlier."""
+
+    def query(self, view):
+        return [
+            LoopCandidate(view.keyframe.id, view.keyframe.id - back, 1.0, "twice")
+            for back in (10, 20)
+            if view.keyframe.id >= back
+        ]
+
+
+class Here:
+    """Says of every pair that the cameras stand where a table of poses has them."""
+
+    def __init__(self, poses):
+        self.poses = poses
+
+    def verify(self, query, match, candidate):
+        T = invert(self.poses[match.id]) @ self.poses[query.id]
+        return LoopConstraint(candidate, T, COVARIANCE, 1.0, 0.0, 1.0, 50, "pnp")
+
+
+def chained(poses, step=1, sigma=0.03):
+    """Odometry between every n-th of the poses, and a loop, which it must pass over."""
+    graph, noise = gtsam.NonlinearFactorGraph(), gtsam.noiseModel.Isotropic.Sigma(6, sigma)
+    for i in range(0, len(poses) - step, step):
+        motion = gtsam.Pose3(invert(poses[i]) @ poses[i + step])
+        robust = gtsam.noiseModel.Robust.Create(gtsam.noiseModel.mEstimator.Huber.Create(1.0), noise)
+        graph.add(gtsam.BetweenFactorPose3(X(i), X(i + step), motion, robust if i % 2 else noise))
+    graph.add(gtsam.BetweenFactorPose3(X(0), X(len(poses) - step), gtsam.Pose3(MOTION), noise))
+    graph.add(gtsam.PriorFactorPose3(X(0), gtsam.Pose3(), noise))
+    return graph
+
+
+def rooms(count, apart):
+    """Where the cameras stand: ten places, then the same ten ``apart`` metres on, then the first ten again."""
+    return [make_transform(np.eye(3), [0.1 * (i % 10) + apart * (i // 10 == 1), 0.0, 0.0]) for i in range(count)]
+
+
+def test_loops_between_rooms_that_look_alike_are_not_believed(room):
+    """The second room is taken for the first; the way back into the first is believed and the rest is not."""
+    truth, looks = rooms(30, apart=4.0), rooms(30, apart=0.0)
+    closer = LoopCloser(room.CAMERA, TwoPlaces(), verifier=Here(looks))
+    fill(room, closer, 30)
+    assert {c.query_key - c.match_key for c in closer.closures} == {10, 20}
+    believed = closer.believed(chained(truth))
+    assert {c.query_key - c.match_key for c in believed} == {20}
+    assert len(believed) == sum(c.query_key - c.match_key == 20 for c in closer.closures)
+
+
+def test_odometry_may_run_over_more_poses_than_the_closer_has(room):
+    poses = rooms(49, apart=0.0)
+    closer = LoopCloser(room.CAMERA, FirstAgain(), verifier=Here(poses[::2]))
+    color, depth = images(room)
+    for i in range(25):
+        closer.add(X(2 * i), color, depth, timestamp=float(i))
+    assert closer.believed(chained(poses)) == list(closer.closures) != []
+    bent = [T @ make_transform(np.eye(3), [0.0, 0.2 * i, 0.0]) for i, T in enumerate(poses)]
+    assert closer.believed(chained(bent)) == []
+
+
+def test_nothing_to_believe_and_odometry_without_a_covariance(room):
+    closer = LoopCloser(room.CAMERA, FirstAgain(), verifier=Believer(MOTION))
+    assert closer.believed(gtsam.NonlinearFactorGraph()) == []
+    fill(room, closer)
+    assert closer.believed(gtsam.NonlinearFactorGraph()) == list(closer.closures)  # no odometry: two maps, joined by it
+
+
 def test_wrong_input_is_refused(room):
     closer = LoopCloser(room.CAMERA, FirstAgain(), verifier=Believer())
     color, depth = images(room)
