@@ -13,7 +13,7 @@ from backend.robust import STRATEGIES
 from semslam.config import BackendConfig
 from semslam.errors import ConfigError, GraphError
 from semslam.geometry import exp_so3, invert, make_transform
-from semslam.types import FloatArray
+from semslam.types import FloatArray, LoopConstraint
 
 GROUP = 6
 """Loops of one look-alike place."""
@@ -31,11 +31,34 @@ class FalseLoopKind(StrEnum):
     CONSISTENT = "consistent"
 
 
+@dataclass(frozen=True, slots=True)
+class Attack:
+    """False loops to be thrown at a graph.
+
+    Attributes:
+        share: false ones among all loops, 0 to below 1.
+        kind: unrelated to one another, or groups that agree among themselves as look-alike places do.
+        seed: of the false loops.
+
+    Raises:
+        ConfigError: the share is out of range.
+    """
+
+    share: float
+    kind: FalseLoopKind = FalseLoopKind.RANDOM
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.share < 1:
+            raise ConfigError(f"The share of false loops must lie between 0 and 1, not {self.share}.")
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class StressOutcome:
     """What false loops did to one strategy.
 
     Attributes:
+        attack: the false loops.
         name: the strategy.
         clean: the solution without them.
         stressed: the solution with them; its poses are what an ATE is to be taken of.
@@ -43,6 +66,7 @@ class StressOutcome:
         false_kept: share of the false ones that were accepted, 0..1.
     """
 
+    attack: Attack
     name: str
     clean: GraphSolution
     stressed: GraphSolution
@@ -52,45 +76,44 @@ class StressOutcome:
 
 def stress(
     graph: PosedGraph,
-    share: float,
-    kind: FalseLoopKind = FalseLoopKind.RANDOM,
-    seed: int = 0,
+    attacks: Sequence[Attack],
     strategies: Sequence[str] = tuple(STRATEGIES),
     config: BackendConfig | None = None,
 ) -> tuple[StressOutcome, ...]:
-    """Optimise a good graph with injected false loops, once per strategy, from odometry alone.
+    """Optimise a good graph with injected false loops, by each strategy and from odometry alone.
 
     Args:
         graph: optimised poses, odometry and loops that are taken for true.
-        share: false ones among all loops, 0 to below 1.
-        kind: unrelated to one another, or groups that agree among themselves as look-alike places do.
-        seed: of the false loops.
+        attacks: the false loops, one set after the other.
         strategies: names from ``backend.robust``.
         config: limits of the optimisation.
 
+    Returns:
+        An outcome per attack and strategy, those of one attack side by side.
+
     Raises:
         GraphError: the graph has no loop, or is too small for false ones.
-        ConfigError: the share is out of range.
     """
-    if not 0 <= share < 1:
-        raise ConfigError(f"The share of false loops must lie between 0 and 1, not {share}.")
     odometry, loops = split_edges(graph)
     if not loops:
         raise GraphError("The graph has no loop, so there is nothing to put under stress.")
-    false = false_loops(graph, round(len(loops) * share / (1 - share)), kind, seed)
-    start = _by_odometry(graph, odometry)
-    settings = config or BackendConfig()
+    start, settings = _by_odometry(graph, odometry), config or BackendConfig()
+    own = [constraint_of(edge) for edge in loops]
+
+    def solve(name: str, chosen: Sequence[LoopConstraint]) -> GraphSolution:
+        limits = settings.model_copy(update={"robust": name})
+        return rebuilt(start, odometry, chosen, graph.anchors, limits).optimize()
+
+    clean = {name: solve(name, own) for name in strategies}
     outcomes = []
-    for name in strategies:
-        chosen = settings.model_copy(update={"robust": name})
-        own = [constraint_of(edge) for edge in loops]
-        injected = [constraint_of(edge, "injected") for edge in false]
-        clean = rebuilt(start, odometry, own, graph.anchors, chosen).optimize()
-        stressed = rebuilt(start, odometry, [*own, *injected], graph.anchors, chosen).optimize()
-        accepted = np.array([verdict.accepted for verdict in stressed.verdicts], dtype=bool)
-        outcomes.append(
-            StressOutcome(name, clean, stressed, _share(accepted[: len(own)], 1.0), _share(accepted[len(own) :], 0.0))
-        )
+    for attack in attacks:
+        count = round(len(loops) * attack.share / (1 - attack.share))
+        false = [constraint_of(edge, "injected") for edge in false_loops(graph, count, attack.kind, attack.seed)]
+        for name in strategies:
+            stressed = solve(name, [*own, *false])
+            accepted = np.array([verdict.accepted for verdict in stressed.verdicts], dtype=bool)
+            kept = _share(accepted[: len(own)], 1.0), _share(accepted[len(own) :], 0.0)
+            outcomes.append(StressOutcome(attack, name, clean[name], stressed, *kept))
     return tuple(outcomes)
 
 

@@ -1,18 +1,19 @@
 """The back end: false loops, covariances that lie, size, and the example graphs of GTSAM's wheel.
 
-    python benchmarks/back_end.py stress
+    python benchmarks/back_end.py stress RUN... [--seeds 3]
+    python benchmarks/back_end.py rings
     python benchmarks/back_end.py graphs
     python benchmarks/back_end.py scale [--keyframes 10000]
     python benchmarks/back_end.py bundle
 
 Each prints a table in Markdown. Times are CPU seconds of this process; set OMP_NUM_THREADS=1 for the published ones.
-What ``stress`` does to simulated runs, ``semslam stress RUN`` does to saved ones.
+``stress`` throws false loops at the graphs of saved runs, as ``semslam stress RUN`` does, ``rings`` at simulated ones.
 """
 
 import argparse
 import resource
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -29,10 +30,11 @@ from backend.pose_graph import PoseGraph
 from backend.products import Edge, PosedGraph
 from backend.robust import STRATEGIES
 from backend.simulation import measure, measure_odometry, noisy, ring
-from backend.stress import FalseLoopKind, false_loops, stress
+from backend.stress import Attack, FalseLoopKind, false_loops, stress
 from semslam.camera import Intrinsics
 from semslam.config import BackendConfig, BundleConfig
 from semslam.geometry import FloatArray, compose, make_transform
+from semslam.stress_test import StressRow, stress_run
 from semslam.types import Observations
 
 SMALL = np.array([0.002] * 3 + [0.004] * 3)
@@ -62,11 +64,41 @@ def laps(count: int, seed: int, scale: float, number: int = 4, every: int = 4) -
     return truth, PosedGraph(dict(enumerate(truth)), (*measure_odometry(truth, rng, scale), *loops), (0,))
 
 
+SHARES = (0.3, 0.5)
+WORST_RATIO, LEAST_KEPT = 1.2, 0.9
+
+
 def run_stress(arguments: argparse.Namespace) -> None:
+    """ATE in cm over the seeds' mean; "holds": ATE within 1.2 times the clean one, 90 % of true loops, no false one."""
+    cases = [(kind, share) for kind in FalseLoopKind for share in SHARES]
+    attacks = [Attack(share, kind, seed) for kind, share in cases for seed in range(arguments.seeds)]
+
+    def rows() -> Iterable[list[str]]:
+        for run in arguments.runs:
+            found = stress_run(run, attacks, arguments.strategies)
+            for index, name in enumerate(arguments.strategies):
+                yield [run.name, name, *summary(found[index :: len(arguments.strategies)], arguments.seeds)]
+
+    head = ["run", "strategy", "clean, cm", *(f"{kind} {share:.0%}, cm" for kind, share in cases), "worst ratio"]
+    print_table([*head, "least true kept", "most false kept", "holds"], rows())
+
+
+def summary(rows: Sequence[StressRow], seeds: int) -> list[str]:
+    """One strategy's figures over all attacks, which follow one another case by case."""
+    stressed = np.array([row.ate_m for row in rows])
+    means = 100 * stressed.reshape(-1, seeds).mean(1)
+    worst = float((stressed / rows[0].ate_clean_m).max())
+    true_kept, false_kept = min(row.true_kept for row in rows), max(row.false_kept for row in rows)
+    holds = worst <= WORST_RATIO and true_kept >= LEAST_KEPT and false_kept == 0
+    figures = [f"{100 * rows[0].ate_clean_m:.2f}", *(f"{mean:.2f}" for mean in means), f"{worst:.2f}"]
+    return [*figures, f"{true_kept:.0%}", f"{false_kept:.0%}", "yes" if holds else "no"]
+
+
+def run_rings(arguments: argparse.Namespace) -> None:
     def rows() -> Iterable[list[str]]:
         for scale in (1.0, 3.0, 8.0):
             for kind in FalseLoopKind:
-                for share in (0.3, 0.5):
+                for share in SHARES:
                     for name in STRATEGIES:
                         yield [f"{scale:g}", kind, f"{share:.0%}", name, *stressed(scale, kind, share, name)]
 
@@ -74,7 +106,7 @@ def run_stress(arguments: argparse.Namespace) -> None:
         found = []
         for seed in range(arguments.seeds):
             truth, graph = laps(240, seed, scale)
-            (outcome,), seconds = timed(lambda g=graph, s=seed: stress(g, share, kind, s, [name]))
+            (outcome,), seconds = timed(lambda g=graph, s=seed: stress(g, [Attack(share, kind, s)], [name]))
             clean, bent = rmse(outcome.clean.poses, truth), rmse(outcome.stressed.poses, truth)
             found.append((clean, bent, bent / clean, outcome.true_kept, outcome.false_kept, seconds / 2))
         mean = np.mean(found, 0)
@@ -218,11 +250,14 @@ def look(T_world_cam: FloatArray, points: FloatArray, camera: Intrinsics, rng: n
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     commands = parser.add_subparsers(required=True)
-    for name, work in (("stress", run_stress), ("graphs", run_graphs), ("scale", run_scale)):
+    for name, work in (("stress", run_stress), ("rings", run_rings), ("graphs", run_graphs), ("scale", run_scale)):
         command = commands.add_parser(name)
         command.set_defaults(work=work)
-        if name == "stress":
+        if name in ("stress", "rings"):
             command.add_argument("--seeds", type=int, default=3)
+        if name == "stress":
+            command.add_argument("runs", nargs="+", type=Path, help="run folders with ground truth")
+            command.add_argument("--strategies", nargs="+", default=list(STRATEGIES))
         if name == "graphs":
             command.add_argument("names", nargs="*", default=["pose3example", "pose3example-grid.txt", "sphere2500"])
         if name == "scale":

@@ -9,9 +9,9 @@ from pydantic import BaseModel, ConfigDict
 from backend.g2o import read_g2o
 from backend.products import GraphSolution
 from backend.robust import STRATEGIES
-from backend.stress import FalseLoopKind, stress
+from backend.stress import Attack, stress
 from eval.trajectory import score_trajectory
-from semslam.errors import ConfigError, ResultsError, TrajectoryError
+from semslam.errors import ResultsError, TrajectoryError
 from semslam.results import SavedRun, read_run
 from semslam.types import Trajectory
 
@@ -28,29 +28,26 @@ class StressRow(BaseModel):
     false_kept: float
 
 
-def stress_run(
-    directory: Path, share: float, kind: str, seed: int, strategies: Sequence[str] | None = None
-) -> list[StressRow]:
+def stress_run(directory: Path, attacks: Sequence[Attack], strategies: Sequence[str] | None = None) -> list[StressRow]:
     """Inject false loops into a run's graph and optimise it by each strategy.
 
     Args:
         directory: the run folder.
-        share: false ones among all loops.
-        kind: "random" or "consistent".
-        seed: of the false loops.
+        attacks: the false loops, one set after the other.
         strategies: names; None = all.
 
+    Returns:
+        A row per attack and strategy, those of one attack side by side.
+
     Raises:
-        ConfigError: the kind or a strategy is unknown.
+        ConfigError: a strategy is unknown.
         GraphError: the graph has no loop, or is too small.
         ResultsError: it is no run folder, or was written by another version.
     """
-    if kind not in set(FalseLoopKind):
-        raise ConfigError(f"There is no kind '{kind}' of false loops. Known: {', '.join(FalseLoopKind)}.")
     saved = read_run(directory)
     names = list(STRATEGIES) if strategies is None else list(strategies)
     graph = read_g2o(directory / "graph.g2o")
-    outcomes = stress(graph, share, FalseLoopKind(kind), seed, names, saved.config.backend)
+    outcomes = stress(graph, attacks, names, saved.config.backend)
     return [
         StressRow(
             name=outcome.name,

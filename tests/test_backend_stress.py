@@ -10,7 +10,7 @@ from backend.g2o import read_g2o, write_g2o
 from backend.judge import judge_graph, split_edges
 from backend.products import Edge, PosedGraph
 from backend.simulation import measure, measure_odometry, ring
-from backend.stress import FalseLoopKind, false_loops, stress
+from backend.stress import Attack, FalseLoopKind, false_loops, stress
 from semslam.config import BackendConfig
 from semslam.errors import ConfigError, GraphError
 
@@ -32,7 +32,7 @@ def error(solution, graph):
 def test_the_default_withstands_thirty_percent(kind, seed):
     graph = good_graph(seed=seed)
     name = BackendConfig().robust
-    (outcome,) = stress(graph, 0.3, kind, seed, [name])
+    (outcome,) = stress(graph, [Attack(0.3, kind, seed)], [name])
     assert outcome.name == name
     assert outcome.true_kept >= 0.9
     assert outcome.false_kept == 0.0
@@ -42,13 +42,13 @@ def test_the_default_withstands_thirty_percent(kind, seed):
 
 def test_plain_least_squares_does_not():
     graph = good_graph()
-    (outcome,) = stress(graph, 0.3, FalseLoopKind.RANDOM, 0, ["none"])
+    (outcome,) = stress(graph, [Attack(0.3)], ["none"])
     assert error(outcome.stressed, graph) > 3 * error(outcome.clean, graph)
     assert outcome.false_kept == 1.0
 
 
 def test_no_false_loops_change_nothing():
-    (outcome,) = stress(good_graph(), 0.0, strategies=["dcs"])
+    (outcome,) = stress(good_graph(), [Attack(0.0)], ["dcs"])
     assert outcome.false_kept == 0.0
     assert all((outcome.clean.poses[key] == outcome.stressed.poses[key]).all() for key in outcome.clean.poses)
 
@@ -73,12 +73,12 @@ def test_consistent_groups_agree_among_themselves():
 def test_stress_needs_loops_room_and_a_share():
     lonely = PosedGraph(dict(enumerate(ring(5))), tuple(measure_odometry(ring(5), np.random.default_rng(0))))
     with pytest.raises(GraphError, match="no loop"):
-        stress(lonely, 0.3)
+        stress(lonely, [Attack(0.3)])
     with pytest.raises(ConfigError, match="share"):
-        stress(good_graph(), 1.0)
+        Attack(1.0)
     small = PosedGraph(lonely.poses, (*lonely.edges, *measure(ring(5), [(0, 4)], np.random.default_rng(0))))
     with pytest.raises(GraphError, match="too small"):
-        stress(small, 0.5)
+        stress(small, [Attack(0.5)])
 
 
 def test_edges_are_told_apart_by_their_keys():

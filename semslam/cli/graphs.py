@@ -82,10 +82,13 @@ def stress_command(
     as_json: options.Json = False,
 ) -> None:
     """Put false loops into a saved run's graph and show what each back end makes of them."""
+    from backend.stress import Attack, FalseLoopKind
     from semslam.stress_test import stress_run
 
+    if kind not in set(FalseLoopKind):
+        raise ConfigError(f"There is no kind '{kind}' of false loops. Known: {', '.join(FalseLoopKind)}.")
     names = None if backends is None else [name.strip() for name in backends.split(",")]
-    rows = stress_run(run, false_loops, kind, seed or 0, names)
+    rows = stress_run(run, [Attack(false_loops, FalseLoopKind(kind), seed or 0)], names)
     if as_json:
         typer.echo(json.dumps({"backends": [row.model_dump() for row in rows]}))
         return
