@@ -1,8 +1,12 @@
-"""The one family of errors that semslam raises for what a user can mend."""
+"""The one family of errors that semslam raises for what a user can mend, and its warning."""
 
 
 class SemslamError(Exception):
     """Something is wrong with the input, a setting or the machine; the message is one clear sentence."""
+
+
+class SemslamWarning(UserWarning):
+    """Something was left out or passed over; the message is one clear sentence."""
 
 
 class DatasetError(SemslamError):

@@ -12,7 +12,7 @@ from importlib import import_module
 from importlib.metadata import entry_points
 from typing import Any
 
-from semslam.errors import ConfigError
+from semslam.errors import ConfigError, SemslamWarning
 
 ODOMETRIES: dict[str, str] = {
     "feature_map": "frontend.feature_map:FeatureMapOdometry",
@@ -76,7 +76,7 @@ def load(group: str, name: str) -> Any:
             try:
                 return entry.load()
             except Exception as error:  # a plug-in may fail in any way it likes
-                warnings.warn(f"The plug-in {entry.value} is broken: {error!r}", stacklevel=2)
+                warnings.warn(f"The plug-in {entry.value} is broken: {error!r}", SemslamWarning, stacklevel=2)
                 raise ConfigError(f"The plug-in '{name}' ({entry.value}) does not import: {error}.") from error
     known = names(group)
     close = difflib.get_close_matches(name, known, n=1)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from semslam.config import Config, load_config
+from semslam.config import Config, load_saved_config
 from semslam.datasets.dataset import Dataset
 from semslam.errors import ConfigError, DatasetError, ResultsError
 from semslam.geometry import is_rigid
@@ -141,7 +141,7 @@ def read_front_end(directory: Path) -> SavedFrontEnd:
         named = source.read_text(encoding="utf-8").strip() if source.exists() else None
     except (OSError, UnicodeDecodeError) as error:
         raise ResultsError(f"{source} cannot be read.") from error
-    return SavedFrontEnd(load_config(directory / "config.yaml"), recording, named)
+    return SavedFrontEnd(load_saved_config(directory / "config.yaml"), recording, named)
 
 
 def read_recording(directory: Path) -> Recording:

@@ -16,7 +16,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from backend.g2o import write_g2o
-from semslam.config import Config, load_config
+from semslam.config import Config, load_saved_config
 from semslam.datasets.dataset import Dataset
 from semslam.datasets.tum_format import read_trajectory, write_trajectory
 from semslam.errors import ResultsError
@@ -129,7 +129,7 @@ def read_run(directory: Path) -> SavedRun:
     truth_file = directory / "groundtruth.txt"
     return SavedRun(
         directory=directory,
-        config=load_config(directory / "config.yaml"),
+        config=load_saved_config(directory / "config.yaml"),
         odometry=read_trajectory(directory / "odometry.txt")[0],
         trajectory=read_trajectory(directory / "trajectory.txt")[0],
         keyframes=read_trajectory(directory / "keyframes.txt")[0],

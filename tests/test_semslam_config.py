@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from semslam import plugins
-from semslam.config import Config, load_config, parse_overrides
-from semslam.errors import ConfigError
+from semslam.config import Config, load_config, load_saved_config, parse_overrides
+from semslam.errors import ConfigError, SemslamWarning
 
 
 def test_a_dump_reads_back_the_same(tmp_path: Path) -> None:
@@ -20,6 +20,23 @@ def test_overrides_reach_nested_sections_and_leave_the_rest() -> None:
     config = load_config(None, parse_overrides(["keyframes.interval=0.5", "detector=none"]))
     assert (config.keyframes.interval, config.detector) == (0.5, "none")
     assert config.keyframes.max_rotation == Config().keyframes.max_rotation
+
+
+def test_a_setting_leaves_those_beside_it_as_they_are() -> None:
+    config = load_config(None, parse_overrides(["verification.features.levels=6", "semantic.nodes.cluster_size=4"]))
+    assert config.verification.features == Config().verification.features.model_copy(update={"levels": 6})
+    assert config.semantic.nodes == Config().semantic.nodes.model_copy(update={"cluster_size": 4})
+
+
+def test_saved_settings_that_are_gone_are_left_out_with_a_warning(tmp_path: Path) -> None:
+    file = tmp_path / "config.yaml"
+    file.write_text("seed: 3\nold: {a: 1}\nloops: {min_gap: 2.5, limit: 4}\n")
+    with pytest.warns(SemslamWarning, match=r"another version.*: loops\.limit, old\.$"):
+        config = load_saved_config(file)
+    assert config == load_config(None, {"seed": 3, "loops": {"min_gap": 2.5}})
+    file.write_text("loops: {min_gap: -1, limit: 4}\n")
+    with pytest.warns(SemslamWarning), pytest.raises(ConfigError, match=r"loops\.min_gap"):
+        load_saved_config(file)
 
 
 @pytest.mark.parametrize(

@@ -83,6 +83,20 @@ def test_an_interrupted_run_is_replayed_as_far_as_it_went(wall: WallDataset) -> 
     assert (again.metrics.frames, again.metrics.unreadable) == (9, 1)
 
 
+def test_an_interrupted_or_older_run_is_replayed_with_a_remark(semslam: Call, saved: Path, tmp_path: Path) -> None:
+    older = tmp_path / "older"
+    shutil.copytree(saved, older)
+    with np.load(saved / "frontend.npz") as file:
+        np.savez(older / "frontend.npz", **dict(file) | {"interrupted": np.array(True)})
+    settings_file = older / "config.yaml"
+    settings_file.write_text(settings_file.read_text() + "forgotten: 1\n")
+    outcome = semslam("run", "--from", older, "--set", "seed=3", "--out", tmp_path / "again", "--no-plots")
+    assert outcome.code == 0
+    assert "was interrupted; its 8 frames of 8 were used" in outcome.err
+    assert "left out, being no settings now: forgotten." in outcome.err
+    assert "seed: 3" in (tmp_path / "again" / "config.yaml").read_text()
+
+
 def test_another_sequence_is_refused(wall: WallDataset) -> None:
     recording = run(wall, ALONE).recording
     for other in (replace(wall, frames=8), replace(wall, depth=1.6)):

@@ -3,13 +3,15 @@
 import os
 import signal
 import sys
+import warnings
+from typing import TextIO
 
 import typer
 
 from semslam import __version__
 from semslam.cli import environment, graphs, models, runs, scores
-from semslam.cli.console import complain
-from semslam.errors import SemslamError
+from semslam.cli.console import complain, remark
+from semslam.errors import SemslamError, SemslamWarning
 
 INTERRUPTED = 130
 FAILED = 2
@@ -42,10 +44,27 @@ for module in (runs, scores, graphs, models, environment):
         app.command(command.name, help=command.help, epilog=command.epilog)(command.run)
 
 
+def _show_warning(
+    message: Warning | str,
+    category: type[Warning],
+    filename: str,
+    lineno: int,
+    file: TextIO | None = None,
+    line: str | None = None,
+) -> None:
+    """Print a warning of our own as its sentence, others with the line they come from."""
+    if issubclass(category, SemslamWarning):
+        remark(str(message))
+    else:
+        print(warnings.formatwarning(message, category, filename, lineno, line), end="", file=file or sys.stderr)
+
+
 def main() -> None:
     """Run the command line; what a user can mend ends in one sentence and exit code 2, Ctrl-C in 130."""
     try:
-        app()
+        with warnings.catch_warnings():
+            warnings.showwarning = _show_warning
+            app()
     except SemslamError as error:
         complain(str(error))
         sys.exit(FAILED)

@@ -25,7 +25,7 @@ Json = Annotated[bool, typer.Option("--json", help="Print JSON on standard outpu
 
 
 def settings(
-    config: Path | None = None,
+    config: "Path | Config | None" = None,
     overrides: list[str] | None = None,
     odometry: str | None = None,
     detector: str | None = None,
@@ -35,10 +35,11 @@ def settings(
     max_frames: int | None = None,
     stride: int = 1,
 ) -> "Config":
-    """Join the settings file, ``--set`` texts and the named options, the later winning."""
-    from semslam.config import load_config, parse_overrides
+    """Join the settings (a file's, or such as are loaded), ``--set`` texts and the named options, the later winning."""
+    from semslam.config import Config, load_config, parse_overrides
 
-    loaded = load_config(config, parse_overrides(overrides or []))
+    changes = parse_overrides(overrides or [])
+    loaded = config.with_changes(**changes) if isinstance(config, Config) else load_config(config, changes)
     named = {"odometry": odometry, "detector": detector, "seed": seed}
     frames = {
         "loader": loader,

@@ -53,7 +53,7 @@ def run_command(
     recording = None if saved is None else saved.recording
     if saved_run is not None and config is not None:
         raise ConfigError("--from takes the saved run's settings; change them with --set, not with --config.")
-    base = config if saved_run is None else saved_run / "config.yaml"
+    base = config if saved is None else saved.config
     chosen = options.settings(base, overrides, odometry, detector, seed, loader, start, max_frames, stride)
     source = _source(sequence, saved)
     if saved is not None:

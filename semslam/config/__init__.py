@@ -20,7 +20,7 @@ from semslam.config.features import FeatureConfig
 from semslam.config.frontend import DenseConfig, FeatureMapConfig, FeatureOdometryConfig, KeyframeConfig, KissConfig
 from semslam.config.section import Section
 from semslam.config.segmentation import SegmentationConfig, TrainingConfig
-from semslam.config.settings import Config, load_config, parse_overrides
+from semslam.config.settings import Config, load_config, load_saved_config, parse_overrides
 from semslam.config.verification import VerificationConfig
 
 __all__ = [
@@ -53,5 +53,6 @@ __all__ = [
     "TrainingConfig",
     "VerificationConfig",
     "load_config",
+    "load_saved_config",
     "parse_overrides",
 ]

@@ -1,11 +1,13 @@
 """All settings joined in ``Config``: read from YAML, overridden, dumped."""
 
+import warnings
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Self, TypeVar
 
 import yaml
 from pydantic import Field, ValidationError
+from pydantic_core import ErrorDetails
 
 from semslam.config.backend import BackendConfig
 from semslam.config.dataset import DatasetConfig
@@ -22,7 +24,7 @@ from semslam.config.frontend import DenseConfig, FeatureMapConfig, FeatureOdomet
 from semslam.config.section import Section
 from semslam.config.segmentation import SegmentationConfig, TrainingConfig
 from semslam.config.verification import VerificationConfig
-from semslam.errors import ConfigError
+from semslam.errors import ConfigError, SemslamWarning
 
 
 class Config(Section):
@@ -72,17 +74,28 @@ def load_config(path: Path | None = None, overrides: Mapping[str, Any] | None = 
     Raises:
         ConfigError: the file cannot be read, or a key or value is not known.
     """
-    values: Any = {}
-    if path is not None:
-        try:
-            values = yaml.safe_load(path.read_text(encoding="utf-8")) or {}
-        except (OSError, UnicodeDecodeError) as error:
-            raise ConfigError(f"The settings file {path} cannot be read: {error}.") from error
-        except yaml.YAMLError as error:
-            raise ConfigError(f"The settings file {path} is not YAML: {' '.join(str(error).split())}.") from error
-        if not isinstance(values, dict):
-            raise ConfigError(f"The settings file {path} must hold 'key: value' pairs.")
-    return _validated(Config, _merged(values, overrides or {}))
+    values = {} if path is None else _read(path)
+    return _validated(Config, _merged(_merged(Config().model_dump(), values), overrides or {}))
+
+
+def load_saved_config(path: Path) -> Config:
+    """Read the settings that an earlier run wrote; what is no setting any more is left out with a warning.
+
+    Raises:
+        ConfigError: the file cannot be read, or a value is not allowed any more.
+    """
+    values = _read(path)
+    gone = [error["loc"] for error in _complaints(values) if error["type"] == "extra_forbidden"]
+    for *sections, key in gone:
+        inside = values
+        for section in sections:
+            inside = inside[section]
+        del inside[key]
+    if gone:
+        names = ", ".join(".".join(map(str, place)) for place in gone)
+        sentence = f"{path} is of another version; left out, being no settings now: {names}."
+        warnings.warn(sentence, SemslamWarning, stacklevel=2)
+    return _validated(Config, _merged(Config().model_dump(), values))
 
 
 def parse_overrides(settings: list[str]) -> dict[str, Any]:
@@ -106,6 +119,26 @@ def parse_overrides(settings: list[str]) -> dict[str, Any]:
             node = node.setdefault(section, {})
         node[key] = value
     return nested
+
+
+def _read(path: Path) -> dict[Any, Any]:
+    try:
+        values = yaml.safe_load(path.read_text(encoding="utf-8")) or {}
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigError(f"The settings file {path} cannot be read: {error}.") from error
+    except yaml.YAMLError as error:
+        raise ConfigError(f"The settings file {path} is not YAML: {' '.join(str(error).split())}.") from error
+    if not isinstance(values, dict):
+        raise ConfigError(f"The settings file {path} must hold 'key: value' pairs.")
+    return values
+
+
+def _complaints(values: Mapping[str, Any]) -> list[ErrorDetails]:
+    try:
+        Config.model_validate(values)
+    except ValidationError as error:
+        return error.errors()
+    return []
 
 
 def _merged(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
