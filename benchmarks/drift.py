@@ -4,8 +4,8 @@
     python benchmarks/drift.py table DIR
 
 Each odometry tracks a sequence once per start; its recording is kept in DIR and replayed with each detector. Every
-replay adds a line to DIR/rows.csv, and what stands there is not done again: a run that was stopped goes on where it
-was. After a change of verification or back end delete rows.csv, after one of an odometry its recordings.
+replay leaves a run folder and adds a line to DIR/rows.csv, and what stands there is not done again: a run that was
+stopped goes on where it was. After a change of verification or back end delete rows.csv, after one of an odometry its recordings.
 
 The table, in Markdown, gives the median and the range over the starts of the ATE (SE(3), all frames) in centimetres,
 each detector's change against no loops on the same recording, and which part it removes of what lies above the best
@@ -24,6 +24,7 @@ from semslam.datasets.selection import Selection
 from semslam.metrics import Metrics
 from semslam.pipeline import replay, run
 from semslam.recording import read_recording, write_recording
+from semslam.results import write_run
 from semslam.types import Frame
 
 ROWS = "rows.csv"
@@ -73,6 +74,7 @@ def measure(arguments: argparse.Namespace) -> None:
                     if (whole.name, odometry, str(start), detector) not in done:
                         again = config.with_changes(detector=detector)
                         result = replay(dataset, read_recording(kept), again)
+                        write_run(result, dataset, kept.with_name(f"{kept.name}-{detector}"), plots=False)
                         add_row(rows, row_of(result.metrics, start))
 
 
