@@ -105,14 +105,25 @@ def keyframe_views(
         yield KeyframeView(keyframe, frame.color, frame.depth, labels)
 
 
+def check_scorable(names: Sequence[str]) -> None:
+    """Find out before long work whether all the detectors can be scored.
+
+    Raises:
+        ConfigError: a name is unknown, or is "none", which scores nothing.
+    """
+    for name in names:
+        plugins.load("semslam.detectors", name)
+        if name == "none":
+            raise ConfigError("The detector 'none' proposes nothing that could be scored.")
+
+
 def exhaustive_detector(name: str, config: Config, keyframes: int) -> LoopDetector:
     """The detector ``name``, set to name every pair of so many keyframes that it scores above 0.
 
     Raises:
         ConfigError: the name is unknown, or is "none", which scores nothing.
     """
-    if name == "none":
-        raise ConfigError("The detector 'none' proposes nothing that could be scored.")
+    check_scorable([name])
     everything = config.loops.model_copy(update={"max_candidates": max(keyframes, 1), "min_score": 0.0})
     detector: LoopDetector = plugins.load("semslam.detectors", name).from_config(config.with_changes(loops=everything))
     return detector

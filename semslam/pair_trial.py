@@ -17,7 +17,7 @@ from semslam.config import Config
 from semslam.datasets import SYNTHETIC, guess_loader, open_dataset
 from semslam.datasets.dataset import Dataset
 from semslam.errors import ConfigError, DatasetError
-from semslam.experiments import exhaustive_detector
+from semslam.experiments import check_scorable, exhaustive_detector
 from semslam.features import FeatureExtractor
 from semslam.geometry import FloatArray, invert
 from semslam.types import Frame, KeyframeView
@@ -83,8 +83,7 @@ def try_pairs(
         raise ConfigError("Name a sequence or a folder of pairs.")
     if config.segmentation.name == "folder":
         raise ConfigError("The segmenter 'folder' has no labels for frames that the test changes; choose another.")
-    for name in names:
-        exhaustive_detector(name, config, 1)
+    check_scorable(names)
 
     def scored(name: str, pairs: Sequence[Pair]) -> ScoredPairs:
         if not pairs:

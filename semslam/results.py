@@ -109,8 +109,22 @@ def check_writable(directory: Path) -> None:
         raise ResultsError(f"{directory} holds something that is no run; name another folder with --out.")
     with writing(directory):
         directory.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=directory.parent) as probe:
-            probe.write(b"semslam")
+        _probe(directory.parent)
+
+
+def check_place(directory: Path) -> None:
+    """Find out before long work whether a folder can be made, or written to where it stands; makes nothing.
+
+    Raises:
+        ResultsError: it cannot.
+    """
+    with writing(directory):
+        _probe(next(path for path in (directory, *directory.parents) if path.exists()))
+
+
+def _probe(folder: Path) -> None:
+    with tempfile.TemporaryFile(dir=folder) as file:
+        file.write(b"semslam")
 
 
 def read_run(directory: Path) -> SavedRun:

@@ -75,6 +75,7 @@ def test_a_mistake_is_one_sentence(semslam: Call, tmp_path: Path, arguments: tup
     assert outcome.code == 2
     assert len(outcome.err.strip().splitlines()) == 1
     assert sentence in outcome.err
+    assert not (tmp_path / "out").exists()
 
 
 def test_an_empty_list_gives_no_pairs(tmp_path: Path) -> None:

@@ -66,15 +66,16 @@ def loops_command(
     from eval.reliability import draw_reliability
     from semslam.datasets import open_dataset
     from semslam.experiments import compare_detectors
-    from semslam.results import write_json, writing
+    from semslam.results import check_place, write_json, writing
 
     chosen = options.settings(config, overrides, odometry, loader=loader, start=start, max_frames=max_frames)
     names = options.detector_names(detectors)
     dataset = open_dataset(sequence, chosen.dataset)
-    with writing(out_directory):
-        out_directory.mkdir(parents=True, exist_ok=True)
+    check_place(out_directory)
     with bar(dataset.name, len(dataset)) as update:
         comparison = compare_detectors(dataset, chosen, names, every, update)
+    with writing(out_directory):
+        out_directory.mkdir(parents=True, exist_ok=True)
     write_json(out_directory / "loops.json", {"detectors": [asdict(quality) for quality in comparison.qualities]})
     with writing(out_directory / "precision_recall.png"):
         title = f"{dataset.name}, every {every}. frame"
@@ -115,7 +116,7 @@ def pairs_command(
 ) -> None:
     """Tell the same place from look-alikes under changes of viewpoint, light and objects."""
     from semslam.pair_trial import PairPlan, try_pairs
-    from semslam.results import writing
+    from semslam.results import check_place, writing
 
     chosen = options.settings(config, overrides, seed=seed)
     names = options.detector_names(detectors)
@@ -123,10 +124,11 @@ def pairs_command(
     if len(set(given)) != len(given):
         raise ConfigError("Name each sequence only once.")
     plan = PairPlan(given, tuple(folder or ()), tuple(threshold_from or ()), every, count)
-    with writing(out_directory):
-        out_directory.mkdir(parents=True, exist_ok=True)
+    check_place(out_directory)
     with bar("pairs", None) as update:
         trial = try_pairs(plan, chosen, names, lambda _set, done, whole: update(done, whole))
+    with writing(out_directory):
+        out_directory.mkdir(parents=True, exist_ok=True)
     _write_pairs(trial, out_directory)
     _print_pairs(trial)
     source = ", ".join(plan.tuning_sequences) or "the other sets given"
