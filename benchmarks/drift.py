@@ -5,7 +5,8 @@
 
 Each odometry tracks a sequence once per start; its recording is kept in DIR and replayed with each detector. Every
 replay leaves a run folder and adds a line to DIR/rows.csv, and what stands there is not done again: a run that was
-stopped goes on where it was. After a change of verification or back end delete rows.csv, after one of an odometry its recordings.
+stopped goes on where it was. After a change of verification or back end delete rows.csv, after one of an odometry its
+recordings.
 
 The table, in Markdown, gives the median and the range over the starts of the ATE (SE(3), all frames) in centimetres,
 each detector's change against no loops on the same recording, and which part it removes of what lies above the best
