@@ -4,8 +4,10 @@ import cv2
 import numpy as np
 import pytest
 import torch
+from hypothesis import given
+from hypothesis import strategies as st
 
-from loop.segmentation.augmentation import random_view
+from loop.segmentation.augmentation import paste_patch, random_view
 from loop.segmentation.build import build_segmenter
 from loop.segmentation.checkpoint import SHIPPED, read_tensors
 from loop.segmentation.evaluation import confusion_matrix, evaluate, score
@@ -161,6 +163,17 @@ def test_views_keep_labels_on_their_pixels(strong_share):
         outer = cv2.erode((drawn == 1).astype(np.uint8), np.ones((15, 15))) > 0
         if inner.any() and outer.any():
             assert view[inner].mean() > view[outer].mean() + 40
+
+
+@given(st.integers(1, 60), st.integers(1, 80), st.integers(0, 10_000))
+def test_a_patch_brings_its_targets_along(height, width, seed):
+    views = [np.full((4 * height, 4 * width, 3), level, np.uint8) for level in (20, 230)]
+    targets = [np.full((height, width, 2), level, np.float32) for level in (20, 230)]
+    paste_patch(views[0], targets[0], views[1], targets[1], np.random.default_rng(seed))
+    assert (views[1] == 230).all()
+    assert (targets[0] == 230).any()
+    assert np.array_equal(views[0][::4, ::4, :2], targets[0])
+    assert np.array_equal(views[0][3::4, 3::4, :2], targets[0])
 
 
 def test_photos_are_found_by_their_classes():

@@ -48,6 +48,34 @@ def random_view(
     return lit, view_labels.astype(labels.dtype, copy=False)
 
 
+def paste_patch(
+    view: UInt8Array, target: Float32Array, other_view: UInt8Array, other_target: Float32Array,
+    rng: np.random.Generator,
+) -> None:  # fmt: skip
+    """Paste a rectangle of another view, with its targets: things outside their usual surroundings.
+
+    CutMix (Yun et al., ICCV 2019), for segmentation after French et al. (BMVC 2020). The rectangle covers about a
+    tenth to a half of the view.
+
+    Args:
+        view: (H, W, 3), changed in place, as ``target``.
+        target: (h, w, C), h and w dividing H and W by the same stride.
+        other_view: as ``view``.
+        other_target: as ``target``.
+        rng: draws everything.
+    """
+    stride = view.shape[0] // target.shape[0]
+    area, stretch = rng.uniform(0.1, 0.5), np.exp(rng.uniform(-0.5, 0.5))
+    cells, pixels = [], []
+    for side, share in zip(target.shape, (np.sqrt(area) / stretch, np.sqrt(area) * stretch), strict=False):
+        length = min(side, max(1, round(side * share)))
+        first = int(rng.integers(side - length + 1))
+        cells.append(slice(first, first + length))
+        pixels.append(slice(stride * first, stride * (first + length)))
+    view[*pixels] = other_view[*pixels]
+    target[*cells] = other_target[*cells]
+
+
 @dataclass(frozen=True, slots=True)
 class _Placement:
     """Where a view looks from: zoom against a view of the whole photo, and roll in degrees."""

@@ -12,7 +12,7 @@ import torch
 import torch.nn.functional as F  # noqa: N812
 from torch import Tensor
 
-from loop.segmentation.augmentation import random_view
+from loop.segmentation.augmentation import paste_patch, random_view
 from loop.segmentation.checkpoint import load_weights, read_tensors, save_atomically, save_weights
 from loop.segmentation.classes import CLASS_COUNT
 from loop.segmentation.decoding import input_size, shrink
@@ -159,6 +159,8 @@ class _Run:
         views, targets = [], []
         for _ in range(count):
             view, target = self._draw(rng)
+            if rng.random() < self.settings.patch_share:
+                paste_patch(view, target, *self._draw(rng), rng)
             views.append(view)
             targets.append(target)
         images = torch.from_numpy(np.stack(views)).permute(0, 3, 1, 2).float() / 127.5 - 1.0

@@ -36,6 +36,7 @@ class TrainingConfig(Section):
     warmup: float = Field(0.08, ge=0, lt=1, description="share of the steps in which the rate climbs")
     average: float = Field(0.998, ge=0, lt=1, description="decay of the weight average that is kept")
     strong_share: float = Field(0.0, ge=0, le=1, description="share of views taken close, rolled, blurred, badly lit")
+    patch_share: float = Field(0.0, ge=0, le=1, description="share of views that hold a patch of another view")
     rare_share: float = Field(0.0, ge=0, le=1, description="share of views drawn by class, every class as often")
     unlabelled: Path | None = Field(None, description="folder of photos without labels, for teachers to judge")
     teachers: tuple[Path, ...] = Field((), description="weights of the networks that judge them together")
