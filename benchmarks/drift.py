@@ -2,6 +2,7 @@
 
     python benchmarks/drift.py run SEQUENCE... --folder DIR --odometries feature,dense,kiss --starts 0,2,4,6,8
     python benchmarks/drift.py table DIR
+    python benchmarks/drift.py list DIR
 
 Each odometry tracks a sequence once per start; its recording is kept in DIR and replayed with each detector. Every
 replay leaves a run folder and adds a line to DIR/rows.csv, and what stands there is not done again: a run that was
@@ -10,14 +11,15 @@ recordings.
 
 The table, in Markdown, gives the median and the range over the starts of the ATE (SE(3), all frames) in centimetres,
 each detector's change against no loops on the same recording, and which part it removes of what lies above the best
-front end of the sequence.
+front end of the sequence. The list, for many detectors, has a line for each of them.
 """
 
 import argparse
 import csv
 import statistics
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Hashable, Iterable, Iterator, Sequence
 from pathlib import Path
+from typing import TypeVar
 
 from semslam.config import Config, DatasetConfig
 from semslam.datasets import Dataset, open_dataset
@@ -33,6 +35,7 @@ ALONE = "none"
 KEY = ("sequence", "odometry", "start", "detector")
 FIGURES = ("alone_m", "ate_m", "tracked", "accepted", "true", "inaccurate", "false")
 Row = dict[str, str]
+NameT = TypeVar("NameT", bound=Hashable)
 
 
 class Rendered:
@@ -144,6 +147,16 @@ def print_table(arguments: argparse.Namespace) -> None:
             print(line(inside, sequence, odometry, detectors, best), flush=True)
 
 
+def print_list(arguments: argparse.Namespace) -> None:
+    rows = read_rows(arguments.folder / ROWS)
+    print("| sequence | odometry | detector | ATE, cm | true/inaccurate/false |\n|---|---|---|---|---|")
+    for sequence, odometry, detector in unique((row["sequence"], row["odometry"], row["detector"]) for row in rows):
+        inside = [row for row in rows if row["sequence"] == sequence]
+        kinds = [sum(errors(inside, odometry, detector, kind).values()) for kind in ("true", "inaccurate", "false")]
+        cells = [spread(errors(inside, odometry, detector).values()), "/".join(f"{kind:.0f}" for kind in kinds)]
+        print(f"| {' | '.join([sequence, odometry, detector, *cells])} |")
+
+
 def line(rows: Sequence[Row], sequence: str, odometry: str, detectors: Sequence[str], best: float) -> str:
     alone = errors(rows, odometry, ALONE)
     causal = errors(rows, odometry, ALONE, "alone_m")
@@ -170,7 +183,7 @@ def errors(rows: Iterable[Row], odometry: str, detector: str, column: str = "ate
     return {row["start"]: float(row[column]) for row in chosen if row[column] != "None"}
 
 
-def unique(names: Iterable[str]) -> list[str]:
+def unique(names: Iterable[NameT]) -> list[NameT]:
     return list(dict.fromkeys(names))
 
 
@@ -197,6 +210,9 @@ def main() -> None:
     printing = commands.add_parser("table")
     printing.set_defaults(work=print_table)
     printing.add_argument("folder", type=Path)
+    listing = commands.add_parser("list")
+    listing.set_defaults(work=print_list)
+    listing.add_argument("folder", type=Path)
     arguments = parser.parse_args()
     arguments.work(arguments)
 
