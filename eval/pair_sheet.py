@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from eval.pairs import Pair, PairGroup
-from eval.plots import render
+from eval.style import render
 from semslam.types import UInt8Array
 
 EXAMPLES = 3

@@ -1,79 +1,19 @@
-"""Pictures of a run: trajectories, errors and loops over time. The same run gives the same bytes.
+"""Pictures of a run: trajectories, errors and loops over time. The same run gives the same bytes."""
 
-Colours are those of Okabe and Ito, which remain apart for colour-blind readers; loops differ in line or marker too.
-"""
-
-import io
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from enum import StrEnum
 
-import matplotlib.style
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from eval.style import IN_GRAPH, LOOKS, ODOMETRY, OPTIMISED, TRUTH, LoopKind, render
 from eval.trajectory import align, position_errors
 from semslam.errors import TrajectoryError
 from semslam.geometry import FloatArray
 from semslam.types import Trajectory
 
-TRUTH, ODOMETRY, OPTIMISED = "#b4b4b4", "#cc79a7", "#0072b2"
-DPI = 130
 LABELS = "xyz"
-STYLE: dict[str, object] = {
-    "font.family": "DejaVu Sans",
-    "font.size": 9.5,
-    "axes.titlesize": 11,
-    "axes.titleweight": "bold",
-    "axes.titlelocation": "left",
-    "axes.titlepad": 10,
-    "axes.edgecolor": "#888888",
-    "axes.labelcolor": "#333333",
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "axes.axisbelow": True,
-    "grid.color": "#e6e6e6",
-    "grid.linewidth": 0.8,
-    "xtick.color": "#555555",
-    "ytick.color": "#555555",
-    "lines.solid_capstyle": "round",
-    "legend.frameon": False,
-    "legend.fontsize": 9,
-    "figure.facecolor": "white",
-    "savefig.facecolor": "white",
-}
-
-
-class LoopKind(StrEnum):
-    """How a loop is drawn: what truth says of an accepted one, or that it did not get so far."""
-
-    TRUE = "true"
-    INACCURATE = "inaccurate"
-    FALSE = "false"
-    ACCEPTED = "accepted"
-    WITHDRAWN = "withdrawn"
-    REJECTED = "rejected"
-
-
-@dataclass(frozen=True, slots=True)
-class _Look:
-    color: str
-    line: str
-    marker: str
-    label: str
-
-
-LOOKS = {
-    LoopKind.TRUE: _Look("#009e73", "-", "o", "true loop"),
-    LoopKind.ACCEPTED: _Look("#009e73", "-", "o", "accepted loop"),
-    LoopKind.INACCURATE: _Look("#e69f00", (0, (4, 1.5)), "s", "inaccurate loop"),  # type: ignore[arg-type]
-    LoopKind.FALSE: _Look("#d55e00", "-", "X", "false loop"),
-    LoopKind.WITHDRAWN: _Look("#56b4e9", ":", "v", "withdrawn by the graph"),
-    LoopKind.REJECTED: _Look("#aaaaaa", "", "o", "rejected by the verification"),
-}
-IN_GRAPH = (LoopKind.TRUE, LoopKind.ACCEPTED, LoopKind.INACCURATE, LoopKind.FALSE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,16 +74,6 @@ def draw_run(run: RunDrawing) -> dict[str, bytes]:
         "axes": render(lambda figure: draw_axes(figure, aligned), (9.0, 6.0)),
         "error": render(lambda figure: draw_errors(figure, aligned), (9.0, 6.0)),
     }
-
-
-def render(draw: Callable[[Figure], None], size: tuple[float, float]) -> bytes:
-    """A PNG, ``size`` in inches, in the common style; it carries no date or version, so equal plots are equal bytes."""
-    with matplotlib.style.context(STYLE, after_reset=True):
-        figure = Figure(figsize=size, dpi=DPI, layout="constrained")
-        draw(figure)
-        buffer = io.BytesIO()
-        figure.savefig(buffer, format="png", metadata={"Software": None})
-    return buffer.getvalue()
 
 
 def draw_top_view(figure: Figure, run: RunDrawing) -> None:

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from matplotlib.figure import Figure
 
 from eval.loop_truth import LoopTruth
-from eval.plots import render
+from eval.style import render
 from eval.trajectory import BoolArray
 from semslam.geometry import FloatArray
 from semslam.types import KeyframeView, LoopCandidate

@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from eval.loop_truth import LoopTruth
-from eval.plots import OPTIMISED, TRUTH, render
+from eval.style import OPTIMISED, TRUTH, render
 from eval.trajectory import BoolArray
 from semslam.geometry import FloatArray
 

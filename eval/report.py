@@ -9,7 +9,7 @@ from string import Template
 import cv2
 import numpy as np
 
-from eval.plots import IN_GRAPH, LOOKS, LoopKind
+from eval.style import IN_GRAPH, LOOKS, LoopKind
 from semslam.types import NodePair, UInt8Array
 
 PICTURES_SHOWN = 24

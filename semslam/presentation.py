@@ -3,8 +3,9 @@
 from collections.abc import Mapping
 from pathlib import Path
 
-from eval.plots import LoopKind, LoopMark, RunDrawing, draw_run
+from eval.plots import LoopMark, RunDrawing, draw_run
 from eval.report import ErrorRow, ReportInput, ReportLoop, loops_to_show, make_report
+from eval.style import LoopKind
 from semslam.datasets.dataset import Dataset
 from semslam.errors import DatasetError
 from semslam.ledger import LedgerEntry, Verdict

@@ -7,7 +7,8 @@ import matplotlib
 import numpy as np
 import pytest
 
-from eval.plots import LoopKind, LoopMark, RunDrawing, draw_run
+from eval.plots import LoopMark, RunDrawing, draw_run
+from eval.style import LoopKind
 from semslam.errors import TrajectoryError
 from semslam.types import Trajectory
 

@@ -6,8 +6,8 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from eval.plots import LoopKind
 from eval.report import ErrorRow, ReportInput, ReportLoop, draw_pair, loops_to_show, make_report
+from eval.style import LoopKind
 from semslam.types import NodePair
 
 IMAGE = np.tile(np.arange(64, dtype=np.uint8)[None, :, None], (48, 1, 3))
