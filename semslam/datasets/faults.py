@@ -14,7 +14,6 @@ What each fault does to the sequence, and what has to come of it:
 | nan_depth | half of the depth values are NaN | as if those pixels had none: no NaN leaves the front end |
 """
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 import cv2
@@ -22,13 +21,14 @@ import numpy as np
 
 from semslam.config import FaultConfig, Interval
 from semslam.datasets.dataset import Dataset
+from semslam.datasets.selection import ChosenFrames
 from semslam.errors import DatasetError
-from semslam.types import Frame, Intrinsics, Trajectory
+from semslam.types import Frame
 
 BLUR_PIXELS = 25
 
 
-class FaultyDataset:
+class FaultyDataset(ChosenFrames):
     """A dataset with faults; the same settings give the same faults, whatever the order of reading.
 
     Args:
@@ -40,37 +40,22 @@ class FaultyDataset:
     """
 
     def __init__(self, dataset: Dataset, config: FaultConfig) -> None:
-        self._dataset, self._config = dataset, config
+        self._config = config
         times = np.array(dataset.timestamps)
         self._elapsed = times - times[0]
         drawn = np.random.default_rng(config.seed).random((2, len(times)))
         gone = drawn[0] < config.drop
         for begin, end in config.gaps:
             gone |= (self._elapsed >= begin) & (self._elapsed < end)
-        self._kept = np.flatnonzero(~gone).tolist()
         self._unreadable = drawn[1] < config.unreadable
-        if not self._kept:
+        if gone.all():
             raise DatasetError(f"The faults leave no frame of {dataset.name}.")
-        self.timestamps = times[self._kept].tolist()
-        self.notes = [*dataset.notes, f"Faults were put in on purpose: {self._describe()}."]
+        super().__init__(dataset, np.flatnonzero(~gone).tolist())
 
     @property
-    def name(self) -> str:
-        """Name of the sound sequence."""
-        return self._dataset.name
-
-    @property
-    def intrinsics(self) -> Intrinsics:
-        """The camera."""
-        return self._dataset.intrinsics
-
-    @property
-    def ground_truth(self) -> Trajectory | None:
-        """Ground truth of the sound sequence."""
-        return self._dataset.ground_truth
-
-    def __len__(self) -> int:
-        return len(self._kept)
+    def notes(self) -> list[str]:
+        """Notes of the sound sequence, and which faults were put in."""
+        return [*self._dataset.notes, f"Faults were put in on purpose: {self._describe()}."]
 
     def frame(self, index: int) -> Frame:
         """Read a frame and damage it as its time demands.
@@ -79,9 +64,7 @@ class FaultyDataset:
             DatasetError: the image is not readable, or was made so.
             IndexError: there is no such frame.
         """
-        if not 0 <= index < len(self):
-            raise IndexError(f"Frame {index} of {len(self)}.")
-        source = self._kept[index]
+        source = self._source(index)
         if self._unreadable[source]:
             raise DatasetError(f"Frame {source} of {self.name} was made unreadable on purpose.")
         frame = self._dataset.frame(self._source_of_image(source))
@@ -96,9 +79,6 @@ class FaultyDataset:
             lost = np.random.default_rng((self._config.seed, source)).random(depth.shape) < 0.5
             depth = np.where(lost, np.float32(np.nan), depth)
         return replace(frame, index=index, timestamp=self.timestamps[index], color=color, depth=depth)
-
-    def __iter__(self) -> Iterator[Frame]:
-        return (self.frame(index) for index in range(len(self)))
 
     def _hits(self, intervals: tuple[Interval, ...], source: int) -> bool:
         return any(begin <= self._elapsed[source] < end for begin, end in intervals)

@@ -1,6 +1,6 @@
 """Choosing frames of a sequence."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from semslam.datasets.dataset import Dataset
@@ -8,26 +8,18 @@ from semslam.errors import DatasetError
 from semslam.types import Frame, Intrinsics, Trajectory
 
 
-class Selection:
-    """Every ``stride``-th frame of a dataset from ``start`` on; frames are numbered from 0 again.
+class ChosenFrames:
+    """Frames of another dataset, numbered from 0 again.
 
     Args:
         dataset: the whole sequence.
-        start: frames left out at its beginning.
-        max_frames: frames taken at the most; None = all.
-        stride: 1 takes every frame, 2 every second.
-
-    Raises:
-        DatasetError: no frame is left.
+        indices: which of its frames, ascending; at least one.
     """
 
-    def __init__(self, dataset: Dataset, start: int = 0, max_frames: int | None = None, stride: int = 1) -> None:
-        self._dataset = dataset
-        self._indices = range(start, len(dataset), stride)[:max_frames]
-        if not self._indices:
-            raise DatasetError(f"No frame is left of {dataset.name}: it has {len(dataset)}, and {start} are skipped.")
+    def __init__(self, dataset: Dataset, indices: Sequence[int]) -> None:
+        self._dataset, self._indices = dataset, indices
         timestamps = dataset.timestamps
-        self.timestamps = [timestamps[i] for i in self._indices]
+        self.timestamps = [timestamps[i] for i in indices]
 
     @property
     def name(self) -> str:
@@ -59,9 +51,33 @@ class Selection:
             DatasetError: an image is not readable.
             IndexError: there is no such frame.
         """
-        if not 0 <= index < len(self):
-            raise IndexError(f"Frame {index} of {len(self)}.")
-        return replace(self._dataset.frame(self._indices[index]), index=index)
+        return replace(self._dataset.frame(self._source(index)), index=index)
 
     def __iter__(self) -> Iterator[Frame]:
         return (self.frame(index) for index in range(len(self)))
+
+    def _source(self, index: int) -> int:
+        """The whole sequence's index of a chosen frame."""
+        if not 0 <= index < len(self):
+            raise IndexError(f"Frame {index} of {len(self)}.")
+        return self._indices[index]
+
+
+class Selection(ChosenFrames):
+    """Every ``stride``-th frame of a dataset from ``start`` on.
+
+    Args:
+        dataset: the whole sequence.
+        start: frames left out at its beginning.
+        max_frames: frames taken at the most; None = all.
+        stride: 1 takes every frame, 2 every second.
+
+    Raises:
+        DatasetError: no frame is left.
+    """
+
+    def __init__(self, dataset: Dataset, start: int = 0, max_frames: int | None = None, stride: int = 1) -> None:
+        indices = range(start, len(dataset), stride)[:max_frames]
+        if not indices:
+            raise DatasetError(f"No frame is left of {dataset.name}: it has {len(dataset)}, and {start} are skipped.")
+        super().__init__(dataset, indices)
