@@ -1,7 +1,7 @@
 """The back end: false loops, covariances that lie, size, and the example graphs of GTSAM's wheel.
 
     python benchmarks/back_end.py stress RUN... [--seeds 3]
-    python benchmarks/back_end.py rings
+    python benchmarks/back_end.py rings [--strategies gnc]
     python benchmarks/back_end.py graphs
     python benchmarks/back_end.py scale [--keyframes 10000]
     python benchmarks/back_end.py bundle
@@ -96,10 +96,10 @@ def summary(rows: Sequence[StressRow], seeds: int) -> list[str]:
 
 def run_rings(arguments: argparse.Namespace) -> None:
     def rows() -> Iterable[list[str]]:
-        for scale in (1.0, 3.0, 8.0):
+        for scale in (1.0, 3.0, 5.0, 8.0):
             for kind in FalseLoopKind:
                 for share in SHARES:
-                    for name in STRATEGIES:
+                    for name in arguments.strategies:
                         yield [f"{scale:g}", kind, f"{share:.0%}", name, *stressed(scale, kind, share, name)]
 
     def stressed(scale: float, kind: FalseLoopKind, share: float, name: str) -> list[str]:
@@ -255,9 +255,9 @@ def main() -> None:
         command.set_defaults(work=work)
         if name in ("stress", "rings"):
             command.add_argument("--seeds", type=int, default=3)
+            command.add_argument("--strategies", nargs="+", default=list(STRATEGIES))
         if name == "stress":
             command.add_argument("runs", nargs="+", type=Path, help="run folders with ground truth")
-            command.add_argument("--strategies", nargs="+", default=list(STRATEGIES))
         if name == "graphs":
             command.add_argument("names", nargs="*", default=["pose3example", "pose3example-grid.txt", "sphere2500"])
         if name == "scale":
