@@ -139,7 +139,7 @@ def read_run(directory: Path) -> SavedRun:
     try:
         metrics = Metrics.model_validate_json(metrics_file.read_text(encoding="utf-8"))
     except (ValidationError, UnicodeDecodeError) as error:
-        raise ResultsError(f"{metrics_file} is damaged.") from error
+        raise ResultsError(f"{metrics_file} is damaged, or of another version.") from error
     truth_file = directory / "groundtruth.txt"
     return SavedRun(
         directory=directory,
