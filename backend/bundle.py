@@ -47,7 +47,7 @@ class BundleResult:
 
     Attributes:
         poses: (4, 4) T_world_cam of every keyframe that was given.
-        rounds: what each adjustment did; none where no landmark is seen often enough.
+        rounds: what each adjustment did; none where no landmark is seen often enough, or none is wanted.
         landmarks: how many landmarks were adjusted.
     """
 
@@ -78,7 +78,7 @@ def adjust(
     """
     poses = {key: checked_pose(T, f"The pose of keyframe {key}") for key, T in poses.items()}
     sightings = gather(poses, observations, intrinsics, config.min_views)
-    if not len(sightings):
+    if not len(sightings) or not config.rounds:
         return BundleResult(poses, (), 0)
     sightings = thinned(sightings, config.max_observations)
     values = make_values(poses)

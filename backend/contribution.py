@@ -53,7 +53,7 @@ def leave_one_out(solution: GraphSolution, config: BackendConfig) -> Iterator[Co
 
 
 def _factors(solution: GraphSolution, accepted: int) -> list[gtsam.NonlinearFactor]:
-    """Anchors, odometry, then the accepted loops."""
+    """Covisible keyframes, anchors, odometry, then the accepted loops."""
     firm = solution.anchors[0]
     factors: list[gtsam.NonlinearFactor] = [
         prior_factor(key, solution.poses[key], ANCHOR_SIGMA if key == firm else FLOATING_SIGMA)
@@ -65,7 +65,7 @@ def _factors(solution: GraphSolution, accepted: int) -> list[gtsam.NonlinearFact
     for index, edge in enumerate(solution.edges):
         scale = solution.odometry_scale if index < odometry else solution.loop_scale
         factors.append(between_factor(edge.widened(scale)))
-    return factors
+    return [*map(between_factor, solution.covisible), *factors]
 
 
 def _graph(factors: list[gtsam.NonlinearFactor]) -> gtsam.NonlinearFactorGraph:

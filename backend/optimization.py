@@ -38,12 +38,14 @@ class GraphProblem:
         priors: (4, 4) T_world_cam at which maps are anchored, by key.
         odometry: edges that are trusted.
         constraints: loops, which may be false.
+        covisible: further edges that are trusted, between keyframes that see the same landmarks.
     """
 
     poses: Mapping[int, FloatArray]
     priors: Mapping[int, FloatArray]
     odometry: Sequence[Edge]
     constraints: Sequence[LoopConstraint]
+    covisible: Sequence[Edge] = ()
 
     def anchor(self, component: Sequence[int]) -> int:
         """The key that holds a component: the first with a prior, or else the first."""
@@ -100,6 +102,7 @@ def optimize_graph(problem: GraphProblem, config: BackendConfig, marginals: bool
         loop_scale=loop_factor,
         components=tuple(components),
         covariances=_marginals(trusted, kept, loop_factor, result.values) if marginals else None,
+        covisible=tuple(problem.covisible),
     )
 
 
@@ -127,7 +130,7 @@ def _trusted(
     for index, component in enumerate(maps):
         key = problem.anchor(component)
         graph.add(prior_factor(key, start[key], FLOATING_SIGMA if index else ANCHOR_SIGMA))
-    for edge in odometry:
+    for edge in (*odometry, *problem.covisible):
         graph.add(between_factor(edge))
     return graph
 

@@ -26,6 +26,7 @@ class PoseGraph:
         self._poses: dict[int, FloatArray] = {}
         self._priors: dict[int, FloatArray] = {}
         self._odometry: dict[tuple[int, int], Edge] = {}
+        self._covisible: dict[tuple[int, int], Edge] = {}
         self._loops: dict[tuple[int, int], LoopConstraint] = {}
 
     @property
@@ -72,6 +73,20 @@ class PoseGraph:
         self._odometry[from_key, to_key] = edge
         return edge
 
+    def add_covisible(self, edge: Edge) -> None:
+        """Join two keyframes that see the same landmarks; trusted as odometry is, but no part of its chain.
+
+        Raises:
+            GraphError: a key is unknown, the pair is joined already, or a matrix is not usable.
+        """
+        what = f"The covisibility of {edge.from_key} and {edge.to_key}"
+        self._require_pair(edge.from_key, edge.to_key)
+        pair = edge.from_key, edge.to_key
+        if pair in self._odometry or pair in self._covisible:
+            raise GraphError(f"{what} is in the graph already.")
+        T, covariance = checked_pose(edge.T_from_to, what), checked_covariance(edge.covariance, what)
+        self._covisible[pair] = Edge(*pair, T, covariance)
+
     def add_loop(self, constraint: LoopConstraint) -> None:
         """Add a loop closure, which may be false.
 
@@ -111,6 +126,7 @@ class PoseGraph:
             priors=dict(self._priors),
             odometry=tuple(self._odometry.values()),
             constraints=tuple(self._loops.values()),
+            covisible=tuple(self._covisible.values()),
         )
         return optimize_graph(problem, self._config, marginals)
 

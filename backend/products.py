@@ -77,6 +77,7 @@ class GraphSolution:
         loop_scale: the same of the loops'.
         components: keys that hang together by odometry and accepted loops; the largest set first.
         covariances: (6, 6) marginals by key where they were asked for.
+        covisible: edges between keyframes that see the same landmarks, which took part beside ``edges``.
     """
 
     poses: dict[int, FloatArray]
@@ -88,6 +89,7 @@ class GraphSolution:
     loop_scale: float
     components: tuple[tuple[int, ...], ...]
     covariances: dict[int, FloatArray] | None = None
+    covisible: tuple[Edge, ...] = ()
 
 
 def loop_edge(constraint: LoopConstraint) -> Edge:

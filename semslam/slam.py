@@ -7,6 +7,7 @@ from typing import Self
 import numpy as np
 
 from backend.bundle import adjust
+from backend.covisibility import Covisibility
 from backend.pose_graph import GraphSolution, PoseGraph
 from frontend.keyframes import KeyframePolicy, make_keyframe
 from frontend.odometry import Odometry
@@ -141,6 +142,7 @@ class Slam:
         self._keyframes: list[Keyframe] = []
         self._outcomes: list[LoopConstraint | LoopRejection] = []
         self._observations: dict[int, Observations] = {}
+        self._covisibility = Covisibility(config.backend.covisibility)
 
     @classmethod
     def from_config(cls, config: Config, stopwatch: Stopwatch | None = None) -> Self:
@@ -247,7 +249,7 @@ class Slam:
         self._connect(keyframe)
         self._keyframes.append(keyframe)
         if motion.observations is not None:
-            self._observations[keyframe.id] = motion.observations
+            self._note(keyframe, motion.observations)
         self._close_loops(frame, keyframe)
         return keyframe
 
@@ -258,6 +260,12 @@ class Slam:
             T_last_this = invert(last.keyframe.T_odom_cam) @ keyframe.T_odom_cam
             self._graph.add_odometry(last.keyframe.id, keyframe.id, T_last_this, last.covariance)
         self._anchors[keyframe.map_id] = _Anchor(keyframe, np.zeros((6, 6)))
+
+    def _note(self, keyframe: Keyframe, seen: Observations) -> None:
+        """Keep the landmarks that a keyframe sees, and bind it to others that see them."""
+        self._observations[keyframe.id] = seen
+        for edge in self._covisibility.add(keyframe.id, keyframe.T_odom_cam, seen, keyframe.intrinsics):
+            self._graph.add_covisible(edge)
 
     def _close_loops(self, frame: Frame, keyframe: Keyframe) -> None:
         labels = None

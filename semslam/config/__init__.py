@@ -1,6 +1,6 @@
 """Settings: one small frozen model per stage, joined in ``Config``; read from YAML, overridden, dumped."""
 
-from semslam.config.backend import BackendConfig, BundleConfig
+from semslam.config.backend import BackendConfig, BundleConfig, CovisibilityConfig
 from semslam.config.dataset import DatasetConfig, FaultConfig, Interval
 from semslam.config.detection import (
     Conv3Config,
@@ -28,6 +28,7 @@ __all__ = [
     "BundleConfig",
     "Config",
     "Conv3Config",
+    "CovisibilityConfig",
     "DatasetConfig",
     "DbowConfig",
     "DenseConfig",

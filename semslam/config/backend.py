@@ -8,7 +8,7 @@ from semslam.config.section import Section
 class BundleConfig(Section):
     """Bundle adjustment of keyframes and landmarks after the closures."""
 
-    rounds: int = Field(3, gt=0, description="adjustments, each without the outliers of the one before")
+    rounds: int = Field(3, ge=0, description="adjustments, each without the outliers of the one before; 0 = none")
     iterations: int = Field(5, gt=0, description="Levenberg-Marquardt steps of a round at the most")
     max_observations: int = Field(250, gt=0, description="observations a keyframe needs; more are mostly left out")
     pixel_sigma: float = Field(1.0, gt=0, description="pixels; error of a keypoint")
@@ -18,7 +18,17 @@ class BundleConfig(Section):
     disparity_weight: float = Field(0.5, gt=0, description="weight of depth, as a virtual disparity, against a pixel")
     baseline: float = Field(0.08, gt=0, description="metres between the virtual stereo pair's cameras")
     outlier: float = Field(2.8, gt=0, description="whitened reprojection error at which an observation is dropped")
-    min_views: int = Field(2, gt=1, description="keyframes that must see a landmark")
+    min_views: int = Field(
+        3, gt=1, description="keyframes that must see a landmark; of two neighbours odometry says the same"
+    )
+
+
+class CovisibilityConfig(Section):
+    """Between-factors of keyframes that see the same landmarks."""
+
+    neighbours: int = Field(2, ge=0, description="older keyframes that each is bound to, besides the last; 0 = off")
+    min_shared: int = Field(30, ge=6, description="landmarks that both must see, and that must agree on the pose")
+    inflation: float = Field(100.0, gt=0, description="factor on the formal variance: neighbours repeat their errors")
 
 
 class BackendConfig(Section):
@@ -41,4 +51,5 @@ class BackendConfig(Section):
     max_loop_scale: float = Field(
         3.0, ge=1, description="how far the loops' deviations may be widened where neighbouring ones disagree"
     )
+    covisibility: CovisibilityConfig = CovisibilityConfig()
     bundle: BundleConfig = BundleConfig()
