@@ -12,6 +12,7 @@ from backend.pose_graph import GraphSolution, PoseGraph
 from frontend.keyframes import KeyframePolicy, make_keyframe
 from frontend.odometry import Odometry
 from loop.detector import LoopDetector
+from loop.following import LoopFollower
 from loop.segmentation.build import build_segmenter
 from loop.segmentation.segmenter import Segmenter
 from loop.verification import IcpVerifier, LoopVerifier
@@ -136,6 +137,7 @@ class Slam:
         self._extractor = FeatureExtractor(config.features)
         self._details = FeatureExtractor(config.verification.features)
         self._policy = KeyframePolicy(config.keyframes)
+        self._follower = LoopFollower(config.loops)
         self._T_odom_cam: FloatArray = np.eye(4)
         self._anchors: dict[int, _Anchor] = {}
         self._frames: list[FrameState] = []
@@ -145,8 +147,10 @@ class Slam:
         self._covisibility = Covisibility(config.backend.covisibility)
 
     @classmethod
-    def from_config(cls, config: Config, stopwatch: Stopwatch | None = None) -> Self:
-        """Build every part by its registered name.
+    def from_config(
+        cls, config: Config, stopwatch: Stopwatch | None = None, verifier: LoopVerifier | None = None
+    ) -> Self:
+        """Build every part by its registered name; a verifier of one's own takes the place of the built-in one.
 
         Raises:
             ConfigError: a name is unknown.
@@ -157,7 +161,7 @@ class Slam:
             odometry=plugins.load("semslam.odometry", config.odometry).from_config(config),
             segmenter=build_segmenter(config) if detector.needs_labels else None,
             detector=detector,
-            verifier=IcpVerifier.from_config(config),
+            verifier=verifier or IcpVerifier.from_config(config),
             graph=PoseGraph(config.backend),
             config=config,
             stopwatch=stopwatch or Stopwatch(),
@@ -247,6 +251,7 @@ class Slam:
             )
         self._policy.note(frame.timestamp, self._T_odom_cam, motion.map_id)
         self._connect(keyframe)
+        self._follower.add(keyframe, self._keyframes[-1] if self._keyframes else None)
         self._keyframes.append(keyframe)
         if motion.observations is not None:
             self._note(keyframe, motion.observations)
@@ -277,11 +282,17 @@ class Slam:
             candidates = self._detector.query(view)
             self._detector.add(view)
         for candidate in candidates:
-            with self._stopwatch.stage("verify"):
-                outcome = self._verifier.verify(keyframe, self._keyframes[candidate.match], candidate)
-            self._outcomes.append(outcome)
-            if isinstance(outcome, LoopConstraint):
-                self._graph.add_loop(outcome)
+            self._verify(keyframe, candidate)
+        for candidate in self._follower.candidates(self._keyframes):
+            self._verify(keyframe, candidate)
+
+    def _verify(self, query: Keyframe, candidate: LoopCandidate) -> None:
+        with self._stopwatch.stage("verify"):
+            outcome = self._verifier.verify(query, self._keyframes[candidate.match], candidate)
+        self._outcomes.append(outcome)
+        self._follower.note(outcome)
+        if isinstance(outcome, LoopConstraint):
+            self._graph.add_loop(outcome)
 
     def _adjusted(self, solution: GraphSolution) -> GraphSolution:
         """The solution with its poses after bundle adjustment of the landmarks that the odometry keeps."""

@@ -14,6 +14,7 @@ class LoopConfig(Section):
 
     min_gap: float = Field(5.0, ge=0, description="seconds that must lie between the frames of a loop")
     max_candidates: int = Field(5, gt=0, description="candidates a query may hand to the verification")
+    follow: int = Field(3, ge=0, description="further keyframes that a known place lets each keyframe try; 0 = none")
     min_score: float | None = Field(None, ge=0, le=1, description="score of a candidate; none = the detector's own")
 
 

@@ -1,0 +1,94 @@
+"""Following a loop: once a place is known again, the keyframes that come after it are at known places too."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from semslam.config import LoopConfig
+from semslam.geometry import invert, transform_points
+from semslam.types import FloatArray, Keyframe, LoopCandidate, LoopConstraint, LoopEvidence, LoopRejection
+
+GAP_SHARE = 0.5
+"""Share of ``loops.min_gap`` that must lie between followed frames: what the loops before say bears them out."""
+ENOUGH = 3
+"""Verified loops of a keyframe after which no more are looked for."""
+POINTS = 50
+"""Points of a cloud that stand for it."""
+MIN_SEEN = 0.3
+"""Share of them that an earlier view must hold."""
+NEAREST, FARTHEST = 0.2, 6.0
+"""Metres from the camera at which a view holds points."""
+
+
+class LoopFollower:
+    """Proposes earlier views of what a keyframe sees, by where the last verified loop puts it.
+
+    A detector that names a place once need not name it again: from there odometry says for a while which earlier
+    keyframes look at the same things. Proposes nothing before the first verified loop, and the detector's own
+    candidates always come before. It is the verification that decides, as with any candidate.
+    """
+
+    name = "follower"
+
+    def __init__(self, config: LoopConfig) -> None:
+        self._config = config
+        self._poses: list[FloatArray] = []
+        self._tried: set[int] = set()
+        self._verified = 0
+        self._following = False
+
+    def add(self, keyframe: Keyframe, before: Keyframe | None) -> None:
+        """Take the newest keyframe, whose loops will be noted next; it follows the one before by odometry."""
+        if before is None or before.map_id != keyframe.map_id:
+            self._following = False
+            self._poses.append(keyframe.T_odom_cam)
+        else:
+            self._poses.append(self._poses[-1] @ invert(before.T_odom_cam) @ keyframe.T_odom_cam)
+        self._tried, self._verified = set(), 0
+
+    def note(self, outcome: LoopConstraint | LoopRejection) -> None:
+        """Take into account what became of a candidate of the newest keyframe, whoever proposed it."""
+        match = outcome.candidate.match
+        self._tried.add(match)
+        if isinstance(outcome, LoopConstraint):
+            if not self._verified:
+                self._poses[-1] = self._poses[match] @ outcome.T_match_query
+            self._verified += 1
+            self._following = True
+
+    def candidates(self, keyframes: Sequence[Keyframe]) -> Iterator[LoopCandidate]:
+        """Earlier keyframes to verify with the newest, ``loops.follow`` at the most, those that see most of it first.
+
+        What became of each must be noted before the next one is taken.
+
+        Args:
+            keyframes: all so far; ``keyframes[i].id`` is i.
+        """
+        if not self._following or not self._config.follow:
+            return
+        query = keyframes[-1]
+        seen = self._seen(query, keyframes)
+        order = [match for match in np.argsort(-seen, kind="stable").tolist() if seen[match] >= MIN_SEEN]
+        for match in [match for match in order if match not in self._tried][: self._config.follow]:
+            if self._verified >= ENOUGH:
+                return
+            share = float(seen[match])
+            yield LoopCandidate(query.id, match, share, self.name, LoopEvidence(figures={"predicted_overlap": share}))
+
+    def _seen(self, query: Keyframe, keyframes: Sequence[Keyframe]) -> FloatArray:
+        """Share (N,) of the query's points that each earlier view holds; 0 for those too young to close a loop."""
+        cloud = query.cloud.points
+        points = transform_points(self._poses[-1], cloud[:: max(len(cloud) // POINTS, 1)].astype(np.float64))
+        gap = GAP_SHARE * self._config.min_gap
+        old = [k for k in keyframes[:-1] if query.timestamp - k.timestamp >= gap]
+        shares = np.zeros(len(keyframes))
+        if not old or not len(points):
+            return shares
+        T_cam_world = invert(np.stack([self._poses[k.id] for k in old]))
+        local = points @ np.swapaxes(T_cam_world[:, :3, :3], 1, 2) + T_cam_world[:, None, :3, 3]
+        camera, depth = query.intrinsics, local[..., 2]
+        ahead = (depth > NEAREST) & (depth < FARTHEST)
+        uv = camera.project(np.where(ahead[..., None], local, [0.0, 0.0, 1.0]).reshape(-1, 3)).reshape(*ahead.shape, 2)
+        inside = ((uv >= 0) & (uv < [camera.width, camera.height])).all(-1)
+        shares[[k.id for k in old]] = (ahead & inside).mean(1)
+        return shares
