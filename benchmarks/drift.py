@@ -1,13 +1,16 @@
 """How much drift loops take away: every odometry without and with detectors, over several starts.
 
-    python benchmarks/drift.py run SEQUENCE... --folder DIR --odometries feature,dense,kiss --starts 0,2,4,6,8
+    python benchmarks/drift.py run SEQUENCE... --folder DIR --jobs 2 --starts 0,2,4,6,8
     python benchmarks/drift.py table DIR
     python benchmarks/drift.py list DIR
 
-Each odometry tracks a sequence once per start; its recording is kept in DIR and replayed with each detector. Every
-replay leaves a run folder and adds a line to DIR/rows.csv, and what stands there is not done again: a run that was
-stopped goes on where it was. After a change of verification or back end delete rows.csv, after one of an odometry its
-recordings.
+Each odometry tracks a sequence once per start (those of ``--once`` at the first start alone); its recording is kept in
+DIR and replayed with each detector. Every replay adds a line to DIR/rows.csv, and what stands there is not done again:
+a run that was stopped goes on where it was. After a change of verification or back end delete rows.csv, after one of an
+odometry its recordings. With ``--runs`` each replay also leaves a run folder.
+
+A process takes one start of a sequence, on one thread. Odometries and detectors share its segmentations and what
+became of each pair of frames: the verification looks at the frames alone, not at where odometry puts them.
 
 The table, in Markdown, gives the median and the range over the starts of the ATE (SE(3), all frames) in centimetres,
 each detector's change against no loops on the same recording, and which part it removes of what lies above the best
@@ -16,19 +19,27 @@ front end of the sequence. The list, for many detectors, has a line for each of 
 
 import argparse
 import csv
+import os
 import statistics
+import time
 from collections.abc import Hashable, Iterable, Iterator, Sequence
+from dataclasses import replace
+from functools import partial
+from multiprocessing import get_context
 from pathlib import Path
 from typing import TypeVar
 
-from semslam.config import Config, DatasetConfig
+import numpy as np
+
+from loop.verification import IcpVerifier
+from semslam.config import Config
 from semslam.datasets import Dataset, open_dataset
 from semslam.datasets.selection import Selection
 from semslam.metrics import Metrics
 from semslam.pipeline import replay, run
 from semslam.recording import read_recording, write_recording
 from semslam.results import write_run
-from semslam.types import Frame
+from semslam.types import Frame, Keyframe, LoopCandidate, LoopConstraint, LoopRejection
 
 ROWS = "rows.csv"
 ALONE = "none"
@@ -39,11 +50,11 @@ NameT = TypeVar("NameT", bound=Hashable)
 
 
 class Rendered:
-    """A dataset whose frames are made once: rendering takes longer than tracking."""
+    """A dataset whose frames are made once, kept in a folder: rendering takes longer than tracking."""
 
-    def __init__(self, dataset: Dataset) -> None:
-        self._dataset = dataset
-        self._frames: dict[int, Frame] = {}
+    def __init__(self, dataset: Dataset, folder: Path) -> None:
+        folder.mkdir(parents=True, exist_ok=True)
+        self._dataset, self._folder = dataset, folder
         self.name, self.intrinsics, self.notes = dataset.name, dataset.intrinsics, dataset.notes
         self.timestamps, self.ground_truth = dataset.timestamps, dataset.ground_truth
 
@@ -52,46 +63,94 @@ class Rendered:
 
     def frame(self, index: int) -> Frame:
         """A frame, rendered when it is first asked for."""
-        if index not in self._frames:
-            self._frames[index] = self._dataset.frame(index)
-        return self._frames[index]
+        path = self._folder / f"{index}.npz"
+        if not path.exists():
+            frame = self._dataset.frame(index)
+            partial_path = path.with_suffix(f".{os.getpid()}.npz")
+            np.savez(partial_path, color=frame.color, depth=frame.depth)
+            partial_path.rename(path)
+            return frame
+        with np.load(path) as kept:
+            return Frame(index, self.timestamps[index], kept["color"], kept["depth"], self.intrinsics)
 
     def __iter__(self) -> Iterator[Frame]:
         return (self.frame(index) for index in range(len(self)))
 
 
+class Remembered:
+    """A verifier that looks at each pair of frames once; a pair with other matched nodes is another pair."""
+
+    def __init__(self, config: Config) -> None:
+        self._verifier = IcpVerifier.from_config(config)
+        self._known: dict[Hashable, LoopConstraint | LoopRejection] = {}
+
+    def verify(self, query: Keyframe, match: Keyframe, candidate: LoopCandidate) -> LoopConstraint | LoopRejection:
+        """What the verifier says, or said before of the same two frames."""
+        key = (query.frame_index, match.frame_index, candidate.evidence.nodes)
+        if key not in self._known:
+            self._known[key] = self._verifier.verify(query, match, candidate)
+        return replace(self._known[key], candidate=candidate)
+
+
 def measure(arguments: argparse.Namespace) -> None:
+    os.environ |= {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
     arguments.folder.mkdir(parents=True, exist_ok=True)
-    rows = arguments.folder / ROWS
-    done = {key_of(row) for row in read_rows(rows)}
-    for sequence in arguments.sequences:
-        whole = open_dataset(sequence)
-        whole = Rendered(whole) if sequence.startswith("synthetic") else whole
-        for start in map(int, arguments.starts.split(",")):
-            dataset = Selection(whole, start, arguments.max_frames) if start or arguments.max_frames else whole
-            for odometry in arguments.odometries.split(","):
-                frames = DatasetConfig(start=start, max_frames=arguments.max_frames)
-                config = Config(odometry=odometry, detector=ALONE, dataset=frames)
-                kept = arguments.folder / f"{whole.name}-{odometry}-{start}"
-                record(dataset, config, kept)
-                for detector in filter(None, arguments.detectors.split(",")):
-                    if (whole.name, odometry, str(start), detector) not in done:
-                        again = config.with_changes(detector=detector)
-                        result = replay(dataset, read_recording(kept), again)
-                        write_run(result, dataset, kept.with_name(f"{kept.name}-{detector}"), plots=False)
-                        add_row(rows, row_of(result.metrics, start))
+    starts = [int(start) for start in arguments.starts.split(",")]
+    tasks = [(sequence, start, start == starts[0]) for sequence in arguments.sequences for start in starts]
+    with get_context("spawn").Pool(arguments.jobs, maxtasksperchild=1) as pool:
+        for rows in pool.imap_unordered(partial(measure_start, arguments), tasks, chunksize=1):
+            print(f"{rows} rows added", flush=True)
+
+
+def measure_start(arguments: argparse.Namespace, task: tuple[str, int, bool]) -> int:
+    """All odometries and detectors on one start of a sequence; returns how many rows that took."""
+    sequence, start, once = task
+    done = {key_of(row) for row in read_rows(arguments.folder / ROWS)}
+    dataset, added = open_dataset(sequence), 0
+    name = dataset.name
+    if sequence.startswith("synthetic"):
+        dataset = Rendered(dataset, arguments.folder / "frames" / name)
+    if start or arguments.max_frames:
+        dataset = Selection(dataset, start, arguments.max_frames)
+    verifier = Remembered(Config())
+    odometries = [*listed(arguments.odometries), *(listed(arguments.once) if once else [])]
+    for odometry in odometries:
+        config = config_of(arguments, odometry, start)
+        kept = arguments.folder / f"{name}-{odometry}-{start}"
+        for detector in listed(arguments.detectors):
+            if (name, odometry, str(start), detector) in done:
+                continue
+            record(dataset, config, kept)
+            spent = time.process_time()
+            changed = config.with_changes(detector=detector)
+            result = replay(dataset, read_recording(kept), changed, verifier=verifier)
+            if arguments.runs:
+                write_run(result, dataset, kept.with_name(f"{kept.name}-{detector}"), plots=False)
+            add_row(arguments.folder / ROWS, row_of(result.metrics, start), time.process_time() - spent)
+            added += 1
+    return added
+
+
+def config_of(arguments: argparse.Namespace, odometry: str, start: int) -> Config:
+    config = Config(odometry=odometry, detector=ALONE).with_changes(
+        dataset={"start": start, "max_frames": arguments.max_frames},
+        segmentation={"cache_dir": arguments.folder / "labels"},
+    )
+    # What each loop brought is for the ledger, and solves the graph once for each of them.
+    return config if arguments.runs else config.with_changes(backend={"contribution_limit": 0})
 
 
 def record(dataset: Dataset, config: Config, directory: Path) -> None:
     """Track a sequence, unless that was done before."""
     if directory.exists():
         return
+    spent = time.process_time()
     recording = run(dataset, config).recording
-    partial = directory.with_suffix(".partial")
-    partial.mkdir(exist_ok=True)
-    write_recording(partial, recording)
-    partial.rename(directory)
-    print(f"recorded {directory.name}", flush=True)
+    unfinished = directory.with_suffix(".partial")
+    unfinished.mkdir(exist_ok=True)
+    write_recording(unfinished, recording)
+    unfinished.rename(directory)
+    print(f"recorded {directory.name}, {time.process_time() - spent:.0f} s", flush=True)
 
 
 def row_of(metrics: Metrics, start: int) -> Row:
@@ -119,17 +178,18 @@ def read_rows(path: Path) -> list[Row]:
     if not path.exists():
         return []
     with path.open(newline="", encoding="utf-8") as file:
-        return list(csv.DictReader(file))
+        rows = list(csv.DictReader(file))
+    return sorted(rows, key=lambda row: (row["sequence"], row["odometry"], int(row["start"])))
 
 
-def add_row(path: Path, row: Row) -> None:
+def add_row(path: Path, row: Row, spent: float) -> None:
     fresh = not path.exists()
     with path.open("a", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, [*KEY, *FIGURES])
         if fresh:
             writer.writeheader()
         writer.writerow(row)
-    print(", ".join(row.values()), flush=True)
+    print(f"{', '.join(row.values())}, {spent:.0f} s", flush=True)
 
 
 def print_table(arguments: argparse.Namespace) -> None:
@@ -177,6 +237,10 @@ def line(rows: Sequence[Row], sequence: str, odometry: str, detectors: Sequence[
     return f"| {' | '.join([*cells, f'{100 * min(tracked):.0f} %'])} |"
 
 
+def listed(names: str) -> list[str]:
+    return [name for name in names.split(",") if name]
+
+
 def errors(rows: Iterable[Row], odometry: str, detector: str, column: str = "ate_m") -> dict[str, float]:
     """A figure by start."""
     chosen = [row for row in rows if (row["odometry"], row["detector"]) == (odometry, detector)]
@@ -203,10 +267,13 @@ def main() -> None:
     measuring.set_defaults(work=measure)
     measuring.add_argument("sequences", nargs="+")
     measuring.add_argument("--folder", type=Path, required=True)
-    measuring.add_argument("--odometries", default="feature,dense,kiss,feature_map,dense_keyframe,auto")
+    measuring.add_argument("--odometries", default="feature,dense,kiss,feature_map")
+    measuring.add_argument("--once", default="dense_keyframe,auto", help="odometries for the first start alone")
     measuring.add_argument("--detectors", default="none,semantic,fused")
     measuring.add_argument("--starts", default="0,2,4,6,8")
     measuring.add_argument("--max-frames", type=int)
+    measuring.add_argument("--jobs", type=int, default=1, help="processes, of one thread each")
+    measuring.add_argument("--runs", action="store_true", help="leave a run folder of each replay")
     printing = commands.add_parser("table")
     printing.set_defaults(work=print_table)
     printing.add_argument("folder", type=Path)

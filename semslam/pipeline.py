@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import partial
 
+from loop.verification import LoopVerifier
 from semslam.config import Config
 from semslam.datasets.dataset import Dataset
 from semslam.datasets.prefetch import prefetch
@@ -73,7 +74,13 @@ def run(dataset: Dataset, config: Config | None = None, progress: Progress = _si
     return session.result()
 
 
-def replay(dataset: Dataset, recording: Recording, config: Config, progress: Progress = _silent) -> RunResult:
+def replay(
+    dataset: Dataset,
+    recording: Recording,
+    config: Config,
+    progress: Progress = _silent,
+    verifier: LoopVerifier | None = None,
+) -> RunResult:
     """Repeat detection, verification and back end on a saved front end; images are read at keyframes alone.
 
     With the settings of the recorded run its trajectory comes out again to the bit.
@@ -83,6 +90,7 @@ def replay(dataset: Dataset, recording: Recording, config: Config, progress: Pro
         recording: what the front end made of it; of an interrupted run, the frames until then.
         config: settings; those of the front end must be the recorded run's (``SavedFrontEnd.check_settings``).
         progress: called after each frame with its index and its state.
+        verifier: decides on candidates; none = the built-in one.
 
     Raises:
         ConfigError: a name or setting is unknown.
@@ -90,7 +98,7 @@ def replay(dataset: Dataset, recording: Recording, config: Config, progress: Pro
         DatasetError: it is another sequence, or a keyframe's image cannot be read.
     """
     recording.check(dataset)
-    session = _Session(dataset, config)
+    session = _Session(dataset, config, verifier)
     session.drive(session.follow(recording), progress)
     return session.result()
 
@@ -98,10 +106,10 @@ def replay(dataset: Dataset, recording: Recording, config: Config, progress: Pro
 class _Session:
     """A run between its first frame and its result."""
 
-    def __init__(self, dataset: Dataset, config: Config) -> None:
+    def __init__(self, dataset: Dataset, config: Config, verifier: LoopVerifier | None = None) -> None:
         self._dataset, self._config = dataset, config
         self._stopwatch, self._clock = Stopwatch(), _Clock()
-        self._slam = Slam.from_config(config, self._stopwatch)
+        self._slam = Slam.from_config(config, self._stopwatch, verifier)
         self._unreadable: list[str] = []
         self._checksum = 0
         self._interrupted = False
