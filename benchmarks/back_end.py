@@ -33,6 +33,7 @@ from backend.simulation import measure, measure_odometry, noisy, ring
 from backend.stress import Attack, FalseLoopKind, false_loops, stress
 from semslam.camera import Intrinsics
 from semslam.config import BackendConfig, BundleConfig
+from semslam.errors import SemslamError
 from semslam.geometry import FloatArray, compose, make_transform
 from semslam.stress_test import StressRow, stress_run
 from semslam.types import Observations
@@ -266,7 +267,10 @@ def main() -> None:
             command.add_argument("--modes", nargs="*", default=["clean", "stressed"], help="of the incremental graph")
     commands.add_parser("bundle").set_defaults(work=run_bundle)
     arguments = parser.parse_args()
-    arguments.work(arguments)
+    try:
+        arguments.work(arguments)
+    except SemslamError as error:
+        parser.exit(2, f"{error}\n")
 
 
 if __name__ == "__main__":
