@@ -1,8 +1,8 @@
 """Between-factors of keyframes that see the same landmarks.
 
-A tracker with a map ties a keyframe to all that it covisibly sees, while a chain of odometry adds up the errors of the
-frames between them as if there were no map. Without further edges loops therefore bend what the map holds straight.
-ORB-SLAM2 keeps such edges in its essential graph (Mur-Artal and Tardós, T-RO 2017, section III-D).
+A tracker with a map ties a keyframe to all that see the same landmarks, while a chain of odometry adds up the errors of
+the frames between them as if there were no map. Without further edges loops therefore bend what the map holds straight.
+ORB-SLAM keeps such edges in its essential graph (Mur-Artal et al., T-RO 2015, section III-D).
 """
 
 from collections import Counter, defaultdict
@@ -23,8 +23,10 @@ GATE = 7.815
 class Covisibility:
     """Binds each keyframe to the older ones that share most landmarks with it.
 
-    The keyframe before is left to odometry, which says all there is to say of the two. A pair is registered anew from
-    the landmarks that both see; its covariance is the formal one, widened since neighbours repeat their errors.
+    The keyframe before is left to odometry, which says all there is to say of the two. An edge holds the relative pose
+    that the tracker found, which rests on more of the map than one pair sees: so edges say nothing new of where
+    keyframes are, only how firmly they hang together. How firmly, a registration of the pair by the landmarks that both
+    see tells: its formal covariance, widened since neighbours repeat their errors.
     """
 
     def __init__(self, config: CovisibilityConfig) -> None:
@@ -40,7 +42,7 @@ class Covisibility:
 
         Args:
             key: the keyframe, newer than all before.
-            T_odom_cam: (4, 4) its pose, from which registrations start.
+            T_odom_cam: (4, 4) where the tracker found it.
             observations: the landmarks it sees.
             intrinsics: the camera.
         """
@@ -57,7 +59,7 @@ class Covisibility:
         return tuple(edge for edge in edges if edge is not None)
 
     def _edge(self, older: int, newer: int, intrinsics: Intrinsics) -> Edge | None:
-        """The newer keyframe in the older one, or None where too few sightings agree on it."""
+        """What binds two keyframes, or None where too few sightings agree on a pose."""
         there, here = self._seen[older], self._seen[newer]
         _, rows, columns = np.intersect1d(there.landmarks, here.landmarks, return_indices=True)
         deep = there.depths[rows] > 0
@@ -65,11 +67,11 @@ class Covisibility:
         points = lift(there.pixels[rows], there.depths[rows], intrinsics).astype(np.float64)
         sigmas = np.hypot(_sigmas(there)[rows], _sigmas(here)[columns])  # either sighting errs
         seen = measure(here.pixels[columns], here.depths[columns], sigmas)
-        guess = invert(self._poses[older]) @ self._poses[newer]
-        found = refine_pose(guess, points, seen, intrinsics, GATE)
+        T_older_newer = invert(self._poses[older]) @ self._poses[newer]
+        found = refine_pose(T_older_newer, points, seen, intrinsics, GATE)
         if found is None or found.inliers.sum() < self._config.min_shared:
             return None
-        return Edge(older, newer, found.T_ref_cam, found.covariance * self._config.inflation)
+        return Edge(older, newer, T_older_newer, found.covariance * self._config.inflation)
 
 
 def _sigmas(observations: Observations) -> FloatArray:
