@@ -1,11 +1,12 @@
 """Measure the verification on posed sequences: poses found, wrong places accepted, covariances against the truth.
 
-    python benchmarks/verification.py SEQ... [--every 5] [--detector fused] [--icp colored]
+    python benchmarks/verification.py SEQ... [--every 5] [--detector fused] [--icp colored] [--kinds 4]
 
 All sequences go into one database, one after the other; the detector proposes across them. Printed for each sequence:
 queries that have a true past loop and the share of them that gets a pose within 0.2 m and 10 degrees, loops verified,
 those with a pose that is off, those of a wrong place, pose errors, and the mean and percentiles of the normalised
-squared error (six degrees of freedom, so 6 is exact).
+squared error (six degrees of freedom, so 6 is exact). With ``--kinds N`` every N-th verified pair is verified again
+with each kind of ICP, in turns: how many stay verified, their pose errors, and processor time.
 """
 
 import argparse
@@ -19,6 +20,7 @@ from eval.loop_truth import ANGLE_TOLERANCE, POSE_TOLERANCE, LoopTruth, find_loo
 from eval.trajectory import poses_at
 from frontend.keyframes import make_keyframe
 from loop.detector import LoopDetector
+from loop.registration import ICP_KINDS
 from loop.segmentation.build import build_segmenter
 from loop.verification import IcpVerifier
 from semslam import plugins
@@ -88,7 +90,7 @@ def report(part: Part) -> None:
     errors, squared, good, wrong = [], [], set(), len(elsewhere)
     for loop in here:
         query, match = loop.candidate.query - part.first, loop.candidate.match - part.first
-        E = invert(invert(part.poses[match]) @ part.poses[query]) @ loop.T_match_query
+        E = error_of(part, loop)
         tangent = np.r_[log_so3(E[:3, :3]), E[:3, 3]]
         squared.append(float(tangent @ np.linalg.solve(loop.covariance, tangent)))
         errors.append((float(np.linalg.norm(E[:3, 3])), float(np.degrees(rotation_angle(E)))))
@@ -109,6 +111,34 @@ def report(part: Part) -> None:
         print(f"  NEES mean {np.mean(squared):.1f}, 50/90/99 % {np.percentile(squared, [50, 90, 99]).round(1)}")
 
 
+def compare_kinds(part: Part, known: list[Keyframe], every: int) -> None:
+    """Print what each kind of ICP makes of every n-th verified pair of a sequence."""
+    pairs = [loop.candidate for loop in part.loops if loop.candidate.match >= part.first][::every]
+    verifiers = {k: IcpVerifier.from_config(Config().with_changes(verification={"icp": k})) for k in ICP_KINDS}
+    errors: dict[str, list[tuple[float, float]]] = {kind: [] for kind in ICP_KINDS}
+    spent: dict[str, list[float]] = {kind: [] for kind in ICP_KINDS}
+    for candidate in pairs:
+        for kind, verifier in verifiers.items():
+            before = time.process_time()
+            loop = verifier.verify(known[candidate.query], known[candidate.match], candidate)
+            spent[kind].append(1e3 * (time.process_time() - before))
+            if isinstance(loop, LoopConstraint):
+                E = error_of(part, loop)
+                errors[kind].append((100 * float(np.linalg.norm(E[:3, 3])), float(np.degrees(rotation_angle(E)))))
+    for kind in ICP_KINDS:
+        middle, late = np.percentile(errors[kind], [50, 95], axis=0)
+        print(
+            f"| {part.name} | {kind} | {len(errors[kind])} of {len(pairs)} | {middle[0]:.1f} / {late[0]:.1f} |"
+            f" {middle[1]:.2f} / {late[1]:.2f} | {np.median(spent[kind]):.0f} |"
+        )
+
+
+def error_of(part: Part, loop: LoopConstraint) -> FloatArray:
+    """Motion (4, 4) from the true pose of a sequence's loop to the verified one."""
+    query, match = loop.candidate.query - part.first, loop.candidate.match - part.first
+    return invert(invert(part.poses[match]) @ part.poses[query]) @ loop.T_match_query
+
+
 def main() -> None:
     """Measure all sequences in one database."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -116,12 +146,16 @@ def main() -> None:
     parser.add_argument("--every", type=int, default=5)
     parser.add_argument("--detector", default="fused")
     parser.add_argument("--icp", default="point_to_plane")
+    parser.add_argument("--kinds", type=int, default=0, help="compare kinds of ICP on every n-th verified pair")
     arguments = parser.parse_args()
     config = Config().with_changes(verification={"icp": arguments.icp})
     detector = plugins.load("semslam.detectors", arguments.detector).from_config(config)
     known: list[Keyframe] = []
     for path in arguments.sequences:
-        report(run(path, arguments.every, config, detector, known))
+        part = run(path, arguments.every, config, detector, known)
+        report(part)
+        if arguments.kinds:
+            compare_kinds(part, known, arguments.kinds)
 
 
 if __name__ == "__main__":
