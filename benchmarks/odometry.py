@@ -2,13 +2,13 @@
 
     python benchmarks/odometry.py SEQUENCE... [--odometry NAME...] [--starts 0 2 4 6 8] [--optimize]
         [--peer PYTHON RUN.PY --depth-scale 5000]
-    python benchmarks/odometry.py SEQUENCE... --faults [--detector NAME]
+    python benchmarks/odometry.py SEQUENCE... --faults [NUMBER...] [--detector NAME]
 
 ``--optimize`` adds the error after the final bundle adjustment. ``--peer`` names a Python with the pyorbslam3 wheel
 and a script that runs it over a TUM-layout folder and writes a trajectory; it is run three times for each start, since
 it is not deterministic, and its median is quoted. Times are CPU seconds of the tracking thread, without decoding.
-``--faults`` runs each sequence whole, once for each fault put into it 10 s after its start; the last one leaves frames
-out behind a black-out, so that the camera wakes up elsewhere.
+``--faults`` runs each sequence whole, once for each fault put into it 10 s after its start, or for those of the numbers
+given (0 = none); the last one leaves frames out behind a black-out, so that the camera wakes up elsewhere.
 """
 
 import argparse
@@ -115,13 +115,13 @@ def run_peer(peer: Sequence[str], path: Path, start: int, depth_scale: float) ->
     return errors
 
 
-def print_faults(path: Path, name: str, detector: str) -> None:
+def print_faults(path: Path, name: str, detector: str, numbers: Sequence[int]) -> None:
     """Figures are of the largest map, as everywhere."""
     print(
         "| sequence | odometry | detector | fault | frames | tracked | maps | lost, s | live ATE (m) | final ATE (m) |"
     )
     print("|---|---|---|---|---|---|---|---|---|---|")
-    for label, faults in FAULTS.items():
+    for label, faults in [list(FAULTS.items())[number] for number in numbers or range(len(FAULTS))]:
         settings = DatasetConfig(faults=faults)
         config = Config().with_changes(odometry=name, detector=detector).model_copy(update={"dataset": settings})
         found = run(open_dataset(path, settings), config).metrics
@@ -141,13 +141,13 @@ def main() -> None:
     parser.add_argument("--optimize", action="store_true")
     parser.add_argument("--peer", nargs=2, metavar=("PYTHON", "SCRIPT"))
     parser.add_argument("--depth-scale", type=float, default=5000.0, help="of the sequences, for the peer")
-    parser.add_argument("--faults", action="store_true")
+    parser.add_argument("--faults", type=int, nargs="*", choices=range(len(FAULTS)), metavar="NUMBER")
     parser.add_argument("--detector", default="none", help="with --faults")
     args = parser.parse_args()
-    if args.faults:
+    if args.faults is not None:
         for path in args.sequences:
             for name in args.odometry:
-                print_faults(path, name, args.detector)
+                print_faults(path, name, args.detector, args.faults)
         return
     print("| sequence | odometry | start | live ATE (m) | optimised ATE (m) | median ms | p95 ms | lost |")
     print("|---|---|---|---|---|---|---|---|")
