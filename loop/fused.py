@@ -8,9 +8,9 @@ import numpy as np
 
 from loop.backbone import Backbone
 from loop.class_index import ClassIndex
+from loop.cosine_index import WholeIndex
 from loop.dbow import make_bag
 from loop.fusion import ClassFeatures, FusionModel, load_fusion, pool_classes
-from loop.growing import GrowingArray
 from loop.memo import LastView
 from loop.segmentation.classes import MOVABLE
 from loop.segmentation.decoding import shrink
@@ -40,12 +40,14 @@ class FusedDetector:
     - whole: two layers of the encoder, pooled to one vector by a generalised mean of their positive and negative
       parts and projected so that what viewpoint and light change is shrunk; cosine;
     - words: square root of the L1 score of tf-idf bags of ORB words;
-    - classes: the encoder's mid-level features averaged over each segmented class, compared class by class and
-      weighed by the class's share of the image; classes that people move count less than structure.
+    - classes: the encoder's mid-level features averaged over each segmented class, as they differ from the class's
+      usual look, compared class by class and weighed by the class's share of the image; classes that people move
+      count less than structure.
 
-    Images are turned upright by the tracked roll first. A logistic function, learned on warped and relit photos of
-    other places, joins the three. Some of the candidates are the best by words alone: they are rarely the likeliest,
-    and often the ones whose pose can be verified.
+    Images are turned upright by the tracked roll first. Cosines are taken without half of what the keyframes so far
+    have in common. A logistic function, learned on warped and relit photos of other places, joins the three. Some of
+    the candidates are the best by words alone: they are rarely the likeliest, and often the ones whose pose can be
+    verified.
     """
 
     name = "fused"
@@ -57,7 +59,7 @@ class FusedDetector:
         self._backbone, self._vocabulary, self._model, self._config = backbone, vocabulary, model, config
         self._max_candidates = loops.max_candidates
         self._timeline = Timeline(loops, config.min_probability)
-        self._whole = GrowingArray(np.float32, (model.projection.shape[1],))
+        self._whole = WholeIndex(model.projection.shape[1])
         self._words = WordIndex()
         self._classes = ClassIndex(MIDDLE_CHANNELS)
         self._labels: list[UInt8Array] = []
@@ -89,7 +91,7 @@ class FusedDetector:
     def add(self, view: KeyframeView) -> None:
         """Remember the view's look."""
         look = self._look(view)
-        self._whole.append(look.whole[None])
+        self._whole.add(look.whole)
         self._words.add(look.bag)
         self._classes.add(look.classes)
         self._labels.append(look.classes.labels)
@@ -102,15 +104,15 @@ class FusedDetector:
         encoding = self._backbone.encode(turn_image(shrink(view.color, size), roll))
         labels = turn_labels(cv2.resize(view.labels.labels, size, interpolation=cv2.INTER_NEAREST), roll)  # type: ignore[arg-type]
         movable = frozenset(i for i, name in enumerate(view.labels.names) if name in MOVABLE)
-        classes = pool_classes(encoding.middle, labels, movable)
+        usual = self._model.usual_looks(view.labels.names)
+        classes = pool_classes(encoding.middle, labels, movable).against(usual)
         bag = make_bag(self._vocabulary, view.keyframe.features.descriptors)
         return _Look(self._model.whole(encoding), bag, classes)
 
     def _parts(self, look: _Look) -> FloatArray:
         """Scores (N, 3) of whole image, words and classes with each remembered keyframe."""
-        whole = self._whole.rows @ look.whole
         words = np.sqrt(self._words.scores(look.bag))
-        return np.column_stack([whole, words, self._classes.scores(look.classes)]).astype(np.float64)
+        return np.column_stack([self._whole.scores(look.whole), words, self._classes.scores(look.classes)])
 
     def _choose(self, view: KeyframeView, probability: FloatArray, words: FloatArray) -> list[int]:
         """Positions by falling probability; a share of them are the best by words."""

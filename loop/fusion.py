@@ -1,18 +1,21 @@
 """How the parts of the fused detector are measured and joined."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import cv2
 import numpy as np
 
 from loop.backbone import Encoding
+from loop.segmentation.classes import NYU40_NAMES
 from loop.weight_file import open_weights
 from semslam.types import Float32Array, FloatArray, UInt8Array
 
 SHIPPED = Path(__file__).parent / "weights" / "fusion.npz"
 MOVABLE_WEIGHT = 0.5
 """What a movable class counts beside structure, which stays where it is."""
+_KNOWN = {name: index for index, name in enumerate(NYU40_NAMES)}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -22,19 +25,24 @@ class FusionModel:
     Attributes:
         mean: (832,) of the pooled descriptors.
         projection: (832, D) that shrinks what changes with viewpoint and light, and keeps what tells places apart.
+        usual: (L, C) usual look of each class in photos, by its place in ``NYU40_NAMES``; row 0 is that of all.
         weights: (3,) of the whole image, the words and the classes in the logistic score.
         bias: of the logistic score.
     """
 
     mean: Float32Array
     projection: Float32Array
+    usual: Float32Array
     weights: FloatArray
     bias: float
 
     def whole(self, encoding: Encoding) -> Float32Array:
-        """The image's unit descriptor (D,)."""
-        projected = (pool_layers(encoding) - self.mean) @ self.projection
-        return np.asarray(projected / max(float(np.linalg.norm(projected)), 1e-9), dtype=np.float32)
+        """The image's descriptor (D,), of no particular length."""
+        return np.asarray((pool_layers(encoding) - self.mean) @ self.projection, dtype=np.float32)
+
+    def usual_looks(self, names: Sequence[str]) -> Float32Array:
+        """(L, C) the usual look of each of a segmenter's classes; that of all where a name is not known."""
+        return self.usual[[_KNOWN.get(name, 0) for name in names]]
 
     def probability(self, parts: FloatArray) -> FloatArray:
         """Probability (N,) of the same place from the cosine, word and class scores (N, 3)."""
@@ -45,7 +53,7 @@ class FusionModel:
         """Write it as a compressed npz."""
         np.savez_compressed(
             path, mean=self.mean.astype(np.float32), projection=self.projection.astype(np.float16),
-            weights=self.weights, bias=np.float64(self.bias),
+            usual=self.usual.astype(np.float32), weights=self.weights, bias=np.float64(self.bias),
         )  # fmt: skip
 
 
@@ -56,8 +64,9 @@ def load_fusion(path: Path = SHIPPED) -> FusionModel:
         ModelError: the file is missing or damaged.
     """
     with open_weights(path, "fusion model") as arrays:
-        mean, projection = (arrays[name].astype(np.float32) for name in ("mean", "projection"))
-        return FusionModel(mean, projection, arrays["weights"].astype(np.float64), float(arrays["bias"].astype(float)))
+        mean, projection, usual = (arrays[name].astype(np.float32) for name in ("mean", "projection", "usual"))
+        weights, bias = (arrays[name].astype(np.float64) for name in ("weights", "bias"))
+        return FusionModel(mean, projection, usual, weights, float(bias))
 
 
 def pool(features: Float32Array) -> Float32Array:
@@ -80,13 +89,17 @@ class ClassFeatures:
 
     Attributes:
         labels: (K,) classes, ascending.
-        vectors: (K, C) float32, of unit length.
+        vectors: (K, C) float32, of unit length, or how those differ from the class's usual look.
         shares: (K,) square root of the share of the image, times the class's weight.
     """
 
     labels: UInt8Array
     vectors: Float32Array
     shares: FloatArray
+
+    def against(self, usual: Float32Array) -> "ClassFeatures":
+        """How each class differs from its usual look, the row (L, C) of its label."""
+        return replace(self, vectors=self.vectors - usual[self.labels])
 
 
 def pool_classes(middle: Float32Array, labels: UInt8Array, movable: frozenset[int]) -> ClassFeatures:

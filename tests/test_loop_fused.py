@@ -7,9 +7,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from loop.class_index import ClassIndex
+from loop.cosine_index import COMMON_AFTER, WholeIndex
 from loop.dbow import grouped
 from loop.fusion import ClassFeatures, FusionModel, load_fusion, pool, pool_classes
-from loop.fusion_training import learn_projection
+from loop.fusion_training import Looks, learn_projection, learn_usual, train_fusion
 from loop.photo_views import make_view, overlap
 from loop.relighting import gamma, noise, relight, shadow, tint
 from loop.upright import roll_of, turn_image, turn_labels
@@ -50,6 +51,57 @@ def test_class_scores_are_one_for_the_same_picture_and_zero_without_common_class
         index.add(features)
     np.testing.assert_allclose(index.scores(one), [1, 0, 0], atol=1e-6)
     np.testing.assert_allclose(index.scores(none), 0)
+
+
+def test_a_class_is_compared_by_how_it_differs_from_its_usual_look() -> None:
+    usual = np.array([[0, 0, 1], [3, 0, 0]], np.float32)
+    vectors = np.array([[3, 1, 0]], np.float32)
+    features = ClassFeatures(np.array([1], np.uint8), vectors, np.array([1.0])).against(usual)
+    np.testing.assert_allclose(features.vectors, [[0, 1, 0]], atol=1e-6)
+    empty = ClassFeatures(np.empty(0, np.uint8), np.empty((0, 3), np.float32), np.empty(0))
+    assert len(empty.against(usual).labels) == 0
+
+
+def test_the_usual_look_of_a_rare_class_is_mostly_that_of_all() -> None:
+    common = ClassFeatures(np.array([1], np.uint8), np.array([[1, 0]], np.float32), np.array([1.0]))
+    rare = ClassFeatures(np.array([2], np.uint8), np.array([[0, 1]], np.float32), np.array([1.0]))
+    usual = learn_usual([common] * 999 + [rare])
+    np.testing.assert_allclose(usual[0], [0.999, 0.001], atol=1e-6)
+    assert usual[1, 0] > 0.999
+    assert 0.01 < usual[2, 1] < 0.1
+
+
+def test_vectors_are_compared_without_half_of_what_all_keyframes_have_in_common() -> None:
+    descriptors = RNG.normal(size=(COMMON_AFTER, 6)).astype(np.float32) + 2
+    index = WholeIndex(6)
+    for descriptor in descriptors:
+        index.add(descriptor)
+    freed = descriptors - descriptors.mean(axis=0) / 4
+    freed /= np.linalg.norm(freed, axis=1, keepdims=True)
+    np.testing.assert_allclose(index.scores(descriptors[3]), freed @ freed[3], atol=1e-5)
+
+
+def test_a_lone_keyframe_is_compared_nearly_as_it_is() -> None:
+    index = WholeIndex(3)
+    index.add(np.array([2, 0, 0], np.float32))
+    np.testing.assert_allclose(index.scores(np.array([0, 3, 0], np.float32)), [0], atol=0.02)
+    np.testing.assert_allclose(index.scores(np.array([4, 0, 0], np.float32)), [1], atol=1e-5)
+
+
+def test_the_join_trusts_what_tells_look_alikes_apart() -> None:
+    count = 240
+    photo = np.repeat(np.arange(count // 2), 2)
+    kind = np.repeat(RNG.integers(0, 6, count // 2), 2)
+    looks = Looks(
+        photo,
+        (np.eye(6)[kind] + RNG.normal(0, 0.05, (count, 6))).astype(np.float32),
+        [(np.array([at]), np.ones(1, np.float32)) for at in photo],
+        [ClassFeatures(np.array([1], np.uint8), np.eye(6, dtype=np.float32)[[at]], np.ones(1)) for at in kind],
+    )
+    model = train_fusion(looks, np.arange(count).reshape(-1, 2), seed=0)
+    same, alike = model.probability(np.array([[1.0, 1.0, 1.0], [1.0, 0.0, 1.0]]))
+    assert same > 0.9
+    assert alike < 0.5
 
 
 bags = st.dictionaries(st.integers(0, 30), st.floats(0.1, 1), min_size=1, max_size=8)
@@ -113,10 +165,13 @@ def test_a_missing_or_damaged_model_is_one_sentence(tmp_path) -> None:
 
 
 def test_a_saved_model_comes_back(tmp_path) -> None:
-    model = FusionModel(np.ones(832, np.float32), np.ones((832, 4), np.float32), np.array([1.0, 2.0, 3.0]), -1.0)
+    usual = np.arange(82, dtype=np.float32).reshape(41, 2)
+    weights = np.array([1.0, 2.0, 3.0])
+    model = FusionModel(np.ones(832, np.float32), np.ones((832, 4), np.float32), usual, weights, -1.0)
     model.save(tmp_path / "m.npz")
     again = load_fusion(tmp_path / "m.npz")
     np.testing.assert_array_equal(again.projection, model.projection)
+    np.testing.assert_array_equal(again.usual_looks(["wall", "a new thing"]), usual[[1, 0]])
     assert (again.bias, again.weights.tolist()) == (-1.0, [1, 2, 3])
 
 
