@@ -14,10 +14,10 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from loop import autoencoder, cnnw, fusion, sda, vocabulary
+from loop import autoencoder, cnnw, conv3, fusion, sda, vocabulary
 from loop.backbone import Backbone
 from loop.dbow import make_bag
-from loop.fusion_training import Looks, train_fusion
+from loop.fusion_training import APART, Looks, train_fusion
 from loop.photo_views import make_view, overlap
 from loop.segmentation.classes import MOVABLE, NYU40_NAMES
 from loop.segmentation.onnx import OnnxSegmenter
@@ -25,7 +25,7 @@ from loop.word_index import Bag
 from semslam.camera import Intrinsics
 from semslam.config import Config
 from semslam.features import FeatureExtractor
-from semslam.types import Features, Frame, UInt8Array
+from semslam.types import Features, Float32Array, Frame, UInt8Array
 
 SIZE = (640, 480)
 VIEWS = 4
@@ -70,8 +70,17 @@ def words_from(folder: Path) -> None:
     backbone = Backbone.from_config(Config())
     rng = np.random.default_rng(SEED)
     maps = [backbone.encode(make_view(photo, rng).color).high for photo in read_photos(folder / "rgb")]
-    words = cnnw.train_channel_words(maps, 128, SEED)
-    np.savez_compressed(cnnw.SHIPPED, words=words.astype(np.float16))
+    words = cnnw.train_channel_words(maps, 128, SEED).astype(np.float16)
+    histograms = np.array([cnnw.count_words(features, words.astype(np.float32)) for features in maps])
+    np.savez_compressed(cnnw.SHIPPED, words=words, min_score=rare_cosine(histograms))
+    np.savez_compressed(conv3.SHIPPED, min_score=rare_cosine(np.array(maps).reshape(len(maps), -1)))
+
+
+def rare_cosine(descriptors: Float32Array) -> float:
+    """The cosine that one in a hundred pairs of photos of different places reaches."""
+    unit = descriptors / np.linalg.norm(descriptors, axis=1, keepdims=True)
+    first, second = np.triu_indices(len(unit), APART + 1)
+    return float(np.quantile((unit @ unit.T)[first, second], 0.99))
 
 
 def fusion_from(folder: Path) -> None:

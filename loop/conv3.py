@@ -1,19 +1,30 @@
 """Flattened convolutional features (Sünderhauf et al., IROS 2015)."""
 
+from pathlib import Path
 from typing import Protocol, Self
 
 import numpy as np
 
 from loop.backbone import Backbone
 from loop.descriptor import DescriptorDetector
+from loop.weight_file import open_weights
 from semslam.config import Config, LoopConfig
 from semslam.types import Float32Array, KeyframeView, UInt8Array
 
+SHIPPED = Path(__file__).parent / "weights" / "encoder_map.npz"
+"""What was learned of the shipped encoder: the score that makes a candidate."""
+
 
 class FeatureMap(Protocol):
-    """Gives the convolutional features (h, w, C) of an RGB image (H, W, 3)."""
+    """Gives the convolutional features (h, w, C) of an RGB image (H, W, 3).
+
+    Attributes:
+        source: which network they come from.
+        min_score: the cosine that makes a candidate.
+    """
 
     source: str
+    min_score: float
 
     def __call__(self, color: UInt8Array) -> Float32Array:
         """Features of an image."""
@@ -28,10 +39,9 @@ class Conv3Detector(DescriptorDetector):
     """
 
     name = "conv3"
-    min_score = 0.73
 
     def __init__(self, loops: LoopConfig, features: FeatureMap) -> None:
-        super().__init__(loops)
+        super().__init__(loops, features.min_score)
         self._features = features
 
     @classmethod
@@ -42,7 +52,7 @@ class Conv3Detector(DescriptorDetector):
             ModelError: the weights are missing or damaged.
         """
         if config.conv3.alexnet is None:
-            return cls(config.loops, EncoderMap(Backbone.from_config(config)))
+            return cls(config.loops, EncoderMap(Backbone.from_config(config), load_min_score()))
         from loop.alexnet import AlexNetMap
 
         return cls(config.loops, AlexNetMap.load(config.conv3.alexnet))
@@ -62,9 +72,20 @@ class EncoderMap:
 
     source = "shipped encoder"
 
-    def __init__(self, backbone: Backbone) -> None:
+    def __init__(self, backbone: Backbone, min_score: float) -> None:
         self._backbone = backbone
+        self.min_score = min_score
 
     def __call__(self, color: UInt8Array) -> Float32Array:
         """(h / 16, w / 16, 320)."""
         return self._backbone.encode(color).high
+
+
+def load_min_score(path: Path = SHIPPED) -> float:
+    """Read the cosine that 99 in 100 pairs of photos of different places stay below.
+
+    Raises:
+        ModelError: the file is missing or damaged.
+    """
+    with open_weights(path, "score of the encoder's map") as arrays:
+        return float(arrays["min_score"].astype(float))

@@ -14,18 +14,20 @@ from semslam.types import Float32Array, KeyframeView, LoopCandidate, LoopEvidenc
 class DescriptorDetector(ABC):
     """Nearest neighbours among image descriptors; the score is the cosine, 0 where it is negative.
 
-    Attributes:
-        name: the registered name.
+    Args:
+        loops: settings of all detectors.
         min_score: the score that makes a candidate where the settings name none; 99 in 100 pairs of photos of different
             places (NYUv2) stay below it.
+
+    Attributes:
+        name: the registered name.
     """
 
     name: str
-    min_score: float
     needs_labels = False
 
-    def __init__(self, loops: LoopConfig) -> None:
-        self._timeline = Timeline(loops, self.min_score)
+    def __init__(self, loops: LoopConfig, min_score: float) -> None:
+        self._timeline = Timeline(loops, min_score)
         self._rows: GrowingArray[np.float32] | None = None
         self._last = LastView(lambda view: _unit(self.describe(view)))
 

@@ -16,18 +16,18 @@ ORIENTATIONS = (8, 8, 8, 8)
 GRID = 4
 CONTRAST_CYCLES = 4.0
 """Cycles per image below which brightness and contrast are evened out."""
+MIN_SCORE = 0.92
 
 
 class GistDetector(DescriptorDetector):
     """Energies of 32 Gabor filters on a 4 x 4 grid, (512,), after local contrast is evened out."""
 
     name = "gist"
-    min_score = 0.92
 
     @classmethod
     def from_config(cls, config: Config) -> Self:
         """Take the section ``loops``."""
-        return cls(config.loops)
+        return cls(config.loops, MIN_SCORE)
 
     def describe(self, view: KeyframeView) -> Float32Array:
         """Mean filter energy in each field of the grid."""

@@ -13,18 +13,18 @@ WIDTH, HEIGHT = 160, 120
 CELL = 20
 BINS = 9
 CLIP = 0.2
+MIN_SCORE = 0.84
 
 
 class HogDetector(DescriptorDetector):
     """One HOG descriptor an image: 8 x 6 cells of nine unsigned orientations, blocks of 2 x 2 cells, L2-Hys."""
 
     name = "hog"
-    min_score = 0.84
 
     @classmethod
     def from_config(cls, config: Config) -> Self:
         """Take the section ``loops``."""
-        return cls(config.loops)
+        return cls(config.loops, MIN_SCORE)
 
     def describe(self, view: KeyframeView) -> Float32Array:
         """All blocks after each other, (5 * 7 * 36,)."""

@@ -10,18 +10,18 @@ from semslam.config import Config
 from semslam.types import Float32Array, KeyframeView
 
 WIDTH, HEIGHT = 32, 24
+MIN_SCORE = 0.61
 
 
 class ThumbnailDetector(DescriptorDetector):
     """Zero-mean correlation of 32 x 24 grey thumbnails."""
 
     name = "thumbnail"
-    min_score = 0.61
 
     @classmethod
     def from_config(cls, config: Config) -> Self:
         """Take the section ``loops``."""
-        return cls(config.loops)
+        return cls(config.loops, MIN_SCORE)
 
     def describe(self, view: KeyframeView) -> Float32Array:
         """The thumbnail without its mean, (768,)."""

@@ -6,7 +6,7 @@ import pytest
 
 from loop.alexnet import AlexNetMap, build_network
 from loop.autoencoder import load_autoencoder, train_autoencoder
-from loop.cnnw import load_channel_words, train_channel_words, unit_channels
+from loop.cnnw import count_words, load_channel_words, train_channel_words, unit_channels
 from loop.gist import GistDetector
 from loop.hog import HogDetector
 from loop.sda import SHIPPED, cut_patches
@@ -61,6 +61,9 @@ def test_channel_words(tmp_path) -> None:
     np.testing.assert_allclose(np.linalg.norm(words, axis=1), 1, atol=1e-5)
     rows, strengths = unit_channels(maps[0])
     np.testing.assert_allclose(rows * strengths[:, None], maps[0].reshape(-1, 10).T, atol=1e-5)
+    counts = count_words(maps[0], words)
+    assert counts.sum() == pytest.approx(strengths.sum(), rel=1e-4)
+    assert (counts > 0).all()
     with pytest.raises(ModelError, match="channel words"):
         load_channel_words(tmp_path / "none.npz")
 
