@@ -117,12 +117,15 @@ def best_threshold(scores: FloatArray, same_place: BoolArray) -> float:
     return float(cuts[np.argmax(hits - alarms)])
 
 
-def find_thresholds(tested: Sequence[ScoredPairs], tuning: Sequence[ScoredPairs] = ()) -> dict[str, list[float]]:
+def find_thresholds(
+    tested: Sequence[ScoredPairs], tuning: Sequence[ScoredPairs] = (), own: Mapping[str, float] | None = None
+) -> dict[str, list[float]]:
     """Each detector's threshold for each tested set, never chosen on that set.
 
     Args:
         tested: what will be judged.
         tuning: other sets that the threshold comes from; without them it comes from all the other tested sets.
+        own: thresholds of detectors that bring one, as a probability does; they are taken as they are.
 
     Raises:
         ConfigError: there is no other set with pairs.
@@ -135,7 +138,8 @@ def find_thresholds(tested: Sequence[ScoredPairs], tuning: Sequence[ScoredPairs]
         others = [other for other in filled if other is not some]
         same = np.concatenate([other.same_place for other in others])
         for name, found in thresholds.items():
-            found.append(best_threshold(np.concatenate([other.scores[name] for other in others]), same))
+            scores = np.concatenate([other.scores[name] for other in others])
+            found.append(own[name] if own and name in own else best_threshold(scores, same))
     return thresholds
 
 

@@ -19,6 +19,9 @@ from semslam.errors import ConfigError, DatasetError
 from semslam.features import FeatureExtractor
 from semslam.types import KeyframeView
 
+PROBABILISTIC = "fused"
+"""The detector whose score is a probability."""
+
 Report = Callable[[int, int], None]
 
 

@@ -17,7 +17,7 @@ from semslam.config import Config
 from semslam.datasets import SYNTHETIC, guess_loader, open_dataset
 from semslam.datasets.dataset import Dataset
 from semslam.errors import ConfigError, DatasetError
-from semslam.experiments import check_scorable, exhaustive_detector
+from semslam.experiments import PROBABILISTIC, check_scorable, exhaustive_detector
 from semslam.features import FeatureExtractor
 from semslam.geometry import FloatArray, invert
 from semslam.types import Frame, KeyframeView
@@ -95,7 +95,8 @@ def try_pairs(
 
     folders = [scored(folder.name, read_pair_folder(folder)) for folder in plan.folders]
     tested = (*map(of_sequence, plan.sequences), *folders)
-    thresholds = find_thresholds(tested, [of_sequence(path) for path in plan.tuning_sequences])
+    own = {PROBABILISTIC: config.fused.min_probability}
+    thresholds = find_thresholds(tested, [of_sequence(path) for path in plan.tuning_sequences], own)
     return PairTrial(tested, thresholds, tuple(judge_pairs(tested, thresholds)))
 
 

@@ -123,6 +123,7 @@ def test_a_threshold_never_comes_from_the_set_that_is_judged() -> None:
     )
     assert find_thresholds([a, b])["x"] == pytest.approx([0.3, 0.1])
     assert find_thresholds([a], [c])["x"] == pytest.approx([0.5])
+    assert find_thresholds([a, b], own={"x": 0.7})["x"] == [0.7, 0.7]
     with pytest.raises(ConfigError, match="at least two"):
         find_thresholds([a])
 

@@ -16,8 +16,6 @@ from semslam.errors import ConfigError
 if TYPE_CHECKING:
     from semslam.pair_trial import PairTrial
 
-PROBABILISTIC = "fused"
-"""The detector whose score is a probability."""
 MAX_COLUMNS = 5
 """More detectors than these make a table by change too wide for a terminal; it is in a file in any case."""
 GROUPS = ("viewpoint", "illumination", "objects")
@@ -65,7 +63,7 @@ def loops_command(
     from eval.precision_recall import draw_curves
     from eval.reliability import draw_reliability
     from semslam.datasets import open_dataset
-    from semslam.experiments import compare_detectors
+    from semslam.experiments import PROBABILISTIC, compare_detectors
     from semslam.results import check_place, write_json, writing
 
     chosen = options.settings(config, overrides, odometry, loader=loader, start=start, max_frames=max_frames)
@@ -115,6 +113,7 @@ def pairs_command(
     seed: options.Seed = None,
 ) -> None:
     """Tell the same place from look-alikes under changes of viewpoint, light and objects."""
+    from semslam.experiments import PROBABILISTIC
     from semslam.pair_trial import PairPlan, try_pairs
     from semslam.results import check_place, writing
 
@@ -132,7 +131,8 @@ def pairs_command(
     _write_pairs(trial, out_directory)
     _print_pairs(trial)
     source = ", ".join(plan.tuning_sequences) or "the other sets given"
-    out.print(f"Thresholds from {source}; results: {out_directory}", soft_wrap=True)
+    own = f"; that of {PROBABILISTIC} is its own" if PROBABILISTIC in names else ""
+    out.print(f"Thresholds from {source}{own}; results: {out_directory}", soft_wrap=True)
 
 
 def _write_pairs(trial: "PairTrial", directory: Path) -> None:
