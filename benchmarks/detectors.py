@@ -15,6 +15,7 @@ Prints Markdown tables. Parts:
 
 import argparse
 import platform
+from collections.abc import Iterator
 from dataclasses import replace
 from itertools import islice
 from time import process_time
@@ -24,7 +25,7 @@ import numpy as np
 from eval.changes import Change, change_frame
 from eval.loop_truth import TRUE_OVERLAP, find_loop_truth, make_view
 from eval.reliability import calibration_error
-from eval.trajectory import poses_at
+from eval.trajectory import BoolArray, poses_at
 from frontend.keyframes import make_keyframe
 from loop.segmentation.build import build_segmenter
 from loop.verification import IcpVerifier
@@ -92,50 +93,57 @@ def print_precision(dataset: Dataset, names: list[str], every: int, calibration:
 def print_changes(dataset: Dataset, names: list[str], every: int) -> None:
     """Acceptance of changed keyframes against their unchanged neighbours."""
     config = Config()
-    assert dataset.ground_truth is not None
     views = list(keyframe_views(dataset, config, every, True))
-    stamps = [view.keyframe.timestamp for view in views]
-    depths = [make_view(view.depth, view.keyframe.intrinsics) for view in views]
-    truth = find_loop_truth(stamps, depths, dataset.ground_truth, min_gap=0.0)
-    wrong = replace(truth, min_gap=config.loops.min_gap).false_pairs
-    wrong |= wrong.T
-    near = np.minimum(truth.overlap, truth.overlap.T) >= TRUE_OVERLAP
     detectors = {name: exhaustive_detector(name, config, len(views)) for name in names}
     for view in views:
         for detector in detectors.values():
             detector.add(view)
-    segmenter, extractor = build_segmenter(config), FeatureExtractor(config.features)
-    thresholds = {name: [] for name in names}
-    accepted: dict[tuple[str, Change], list[float]] = {}
-    for row in range(0, len(views), CHANGED_STEP):
-        beside = [at for at in (row - 1, row + 1) if 0 <= at < len(views) and near[row, at]]
-        frame = Frame(row, stamps[row] + LATER, views[row].color, views[row].depth, views[row].keyframe.intrinsics)
-        for change in Change:
-            changed = change_frame(frame, change, row)
-            if change is not Change.NONE and changed is frame:
-                continue
-            features = extractor.extract(changed)
-            keyframe = make_keyframe(
-                len(views), changed, views[row].keyframe.T_odom_cam, 0, features, config.keyframes
-            )  # fmt: skip
-            labels = segmenter.segment(changed.color)
-            query = KeyframeView(keyframe, changed.color, changed.depth, labels)
-            for name, detector in detectors.items():
-                scores = np.zeros(len(views))
-                for candidate in detector.query(query):
-                    scores[candidate.match] = candidate.score
-                if change is Change.NONE:
-                    thresholds[name] += scores[wrong[row]].tolist()
-                else:
-                    accepted.setdefault((name, change), []).extend(scores[beside].tolist())
+    wrong, near = wrong_and_near(dataset, views, config.loops.min_gap)
+    unchanged: dict[str, list[float]] = {name: [] for name in names}
+    beside: dict[tuple[str, Change], list[float]] = {}
+    for row, change, query in changed_views(views, config):
+        for name, detector in detectors.items():
+            scores = np.zeros(len(views))
+            for candidate in detector.query(query):
+                scores[candidate.match] = candidate.score
+            if change is Change.NONE:
+                unchanged[name] += scores[wrong[row]].tolist()
+            else:
+                beside.setdefault((name, change), []).extend(scores[near[row]].tolist())
     changes = [change for change in Change if change is not Change.NONE]
     print(f"{dataset.name}: share accepted at 1 % of the wrong pairs\n")
     print("| detector | " + " | ".join(changes) + " |\n|---|" + "---|" * len(changes))
     for name in names:
-        limit = np.quantile(thresholds[name], 0.99)
-        shares = [float(np.mean(np.array(accepted.get((name, change), [np.nan])) > limit)) for change in changes]
+        limit = np.quantile(unchanged[name], 0.99)
+        shares = [float(np.mean(np.array(beside.get((name, change), [np.nan])) > limit)) for change in changes]
         print(f"| {name} | " + " | ".join(f"{share:.3f}" for share in shares) + " |", flush=True)
     print()
+
+
+def wrong_and_near(dataset: Dataset, views: list[KeyframeView], min_gap: float) -> tuple[BoolArray, BoolArray]:
+    """(N, N) which views, long apart, show different places, and which stand next to one another and see the same."""
+    assert dataset.ground_truth is not None
+    depths = [make_view(view.depth, view.keyframe.intrinsics) for view in views]
+    truth = find_loop_truth([v.keyframe.timestamp for v in views], depths, dataset.ground_truth, min_gap=0.0)
+    wrong = replace(truth, min_gap=min_gap).false_pairs
+    rows = np.arange(len(views))
+    beside = np.abs(rows[:, None] - rows) == 1
+    return wrong | wrong.T, beside & (np.minimum(truth.overlap, truth.overlap.T) >= TRUE_OVERLAP)
+
+
+def changed_views(views: list[KeyframeView], config: Config) -> Iterator[tuple[int, Change, KeyframeView]]:
+    """Every third view, unchanged and with each change that it can show, asked for long after the last one."""
+    segmenter, extractor = build_segmenter(config), FeatureExtractor(config.features)
+    for row in range(0, len(views), CHANGED_STEP):
+        old = views[row]
+        frame = Frame(row, old.keyframe.timestamp + LATER, old.color, old.depth, old.keyframe.intrinsics)
+        for change in Change:
+            changed = change_frame(frame, change, row)
+            if change is Change.NONE or changed is not frame:
+                features, pose = extractor.extract(changed), old.keyframe.T_odom_cam
+                keyframe = make_keyframe(len(views), changed, pose, 0, features, config.keyframes)
+                labels = segmenter.segment(changed.color)
+                yield row, change, KeyframeView(keyframe, changed.color, changed.depth, labels)
 
 
 def print_mixed(datasets: list[Dataset], names: list[str], every: int) -> None:
