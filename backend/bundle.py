@@ -70,8 +70,9 @@ def adjust(
         observations: landmarks seen, by key; keys without a pose are passed over.
         intrinsics: the camera; its distortion is not used, since observations are undistorted.
         config: weights and rounds.
-        edges: odometry and accepted loops. Odometry rests on the same observations, but on those of all frames
-            between the keyframes too: without it the adjustment is less accurate on every sequence measured.
+        edges: odometry, accepted loops and what binds covisible keyframes. Odometry rests on the same observations,
+            but on those of all frames between the keyframes too: without it the adjustment is less accurate on every
+            sequence measured.
 
     Raises:
         GraphError: a pose is not a finite rigid transform, or the optimiser failed.

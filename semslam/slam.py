@@ -9,6 +9,7 @@ import numpy as np
 from backend.bundle import adjust
 from backend.covisibility import Covisibility
 from backend.pose_graph import GraphSolution, PoseGraph
+from backend.repetition import discounted
 from frontend.keyframes import KeyframePolicy, make_keyframe
 from frontend.odometry import Odometry
 from loop.detector import LoopDetector
@@ -297,7 +298,8 @@ class Slam:
     def _adjusted(self, solution: GraphSolution) -> GraphSolution:
         """The solution with its poses after bundle adjustment of the landmarks that the odometry keeps."""
         intrinsics = self._keyframes[0].intrinsics
-        result = adjust(solution.poses, self._observations, intrinsics, self._config.backend.bundle, solution.edges)
+        edges = (*solution.edges, *solution.covisible)
+        result = adjust(solution.poses, self._observations, intrinsics, self._config.backend.bundle, edges)
         return replace(solution, poses=result.poses)
 
     def _components(self, solution: GraphSolution) -> dict[int, int]:
