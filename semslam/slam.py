@@ -12,7 +12,7 @@ from backend.pose_graph import GraphSolution, PoseGraph
 from backend.repetition import discounted
 from frontend.keyframes import KeyframePolicy, make_keyframe
 from frontend.odometry import Odometry
-from loop.detector import LoopDetector
+from loop.detector import LoopDetector, NoLoops
 from loop.following import LoopFollower
 from loop.segmentation.build import build_segmenter
 from loop.segmentation.segmenter import Segmenter
@@ -241,6 +241,8 @@ class Slam:
 
     def _add_keyframe(self, frame: Frame, motion: Motion) -> Keyframe:
         with self._stopwatch.stage("keyframe"):
+            # They serve the verification alone, which cannot know in time which keyframes it will be shown.
+            details = None if isinstance(self._detector, NoLoops) else self._details.extract(frame)
             keyframe = make_keyframe(
                 len(self._keyframes),
                 frame,
@@ -248,7 +250,7 @@ class Slam:
                 motion.map_id,
                 self._extractor.extract(frame),
                 self._config.keyframes,
-                self._details.extract(frame),
+                details,
             )
         self._policy.note(frame.timestamp, self._T_odom_cam, motion.map_id)
         self._connect(keyframe)
