@@ -40,21 +40,15 @@ class Mapper:
             self._running = _WindowAdjustment(self._map, window, view, self._config)
         return keyframe
 
-    def proceed(self) -> bool:
-        """Do one slice of the running adjustment; True when the map has just changed."""
-        if self._running is None:
-            return False
-        if self._running.proceed():
+    def proceed(self) -> None:
+        """Do one slice of the running adjustment, if there is one."""
+        if self._running is not None and self._running.proceed():
             self._running = None
-            return True
-        return False
 
-    def finish(self) -> bool:
-        """Run the adjustment to its end; True when the map has just changed."""
-        changed = False
+    def finish(self) -> None:
+        """Run the adjustment to its end."""
         while self._running is not None:
-            changed = self.proceed()
-        return changed
+            self.proceed()
 
     def _cull(self, newest: MapKeyframe) -> None:
         """Drop landmarks that were hardly met again, or not by another keyframe in the first few."""

@@ -21,11 +21,6 @@ class ConstantVelocity:
         self._tracked_at = -np.inf
         self._velocity = np.zeros(6)
 
-    @property
-    def velocity(self) -> FloatArray:
-        """Angular and linear velocity (6,), radians and metres a second, at the last tracked frame."""
-        return self._velocity
-
     def seconds_since_last(self, timestamp: float) -> float:
         """Seconds from the last frame, tracked or not."""
         return 0.0 if self._timestamp is None else timestamp - self._timestamp
