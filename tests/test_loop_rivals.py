@@ -7,6 +7,7 @@ import pytest
 from loop.alexnet import AlexNetMap, build_network
 from loop.autoencoder import load_autoencoder, train_autoencoder
 from loop.cnnw import count_words, load_channel_words, train_channel_words, unit_channels
+from loop.conv3 import load_min_score
 from loop.gist import GistDetector
 from loop.hog import HogDetector
 from loop.sda import SHIPPED, cut_patches
@@ -66,6 +67,12 @@ def test_channel_words(tmp_path) -> None:
     assert (counts > 0).all()
     with pytest.raises(ModelError, match="channel words"):
         load_channel_words(tmp_path / "none.npz")
+
+
+def test_from_which_score_conv3_proposes_is_learned_with_the_encoder(tmp_path) -> None:
+    assert 0 < load_min_score() < 1
+    with pytest.raises(ModelError, match="no score of the encoder's map"):
+        load_min_score(tmp_path / "none.npz")
 
 
 def test_alexnet_is_asked_for_by_its_hash(tmp_path) -> None:
