@@ -99,6 +99,9 @@ def print_changes(dataset: Dataset, names: list[str], every: int) -> None:
         for detector in detectors.values():
             detector.add(view)
     wrong, near = wrong_and_near(dataset, views, config.loops.min_gap)
+    if not wrong[::CHANGED_STEP].any():
+        print(f"{dataset.name}: no wrong pairs to hold the changed keyframes against\n")
+        return
     unchanged: dict[str, list[float]] = {name: [] for name in names}
     beside: dict[tuple[str, Change], list[float]] = {}
     for row, change, query in changed_views(views, config):
