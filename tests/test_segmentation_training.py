@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from loop.segmentation.augmentation import paste_patch, random_view
+from loop.segmentation.averaging import average
 from loop.segmentation.build import build_segmenter
 from loop.segmentation.checkpoint import SHIPPED, read_tensors
 from loop.segmentation.evaluation import confusion_matrix, evaluate, score
@@ -198,6 +199,19 @@ def test_learning_rate_climbs_then_falls():
     assert np.argmax(rates) in (9, 10)
     assert rates[0] == pytest.approx(0.1)
     assert rates[-1] < 0.01
+
+
+def test_the_mean_of_networks_lies_between_them(rooms, tmp_path):
+    paths = [train(rooms, settings(), tmp_path / "a"), train(rooms, settings(epochs=1), tmp_path / "b")]
+    config = settings()
+    mean = read_tensors(average(rooms, [paths[0], paths[1], paths[1]], config, tmp_path / "mean"))
+    a, b = map(read_tensors, paths)
+    for name, value in mean.items():
+        if value.is_floating_point():
+            torch.testing.assert_close(value, (a[name] + 2 * b[name]) / 3, rtol=2e-3, atol=1e-4)
+    assert load_graph(tmp_path / "mean" / "weights.onnx", "int8")
+    with pytest.raises(ModelError, match="no network weights"):
+        average(rooms, [paths[0], tmp_path / "absent.pt"], config, tmp_path / "mean")
 
 
 def test_scores_of_a_case_done_by_hand():

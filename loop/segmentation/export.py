@@ -7,7 +7,7 @@ The graph takes an image (1, height, width, 3) uint8 RGB of any size in multiple
 import io
 import tempfile
 import warnings
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,10 +17,12 @@ from onnxruntime.quantization import CalibrationDataReader, CalibrationMethod, Q
 from onnxruntime.quantization.shape_inference import quant_pre_process
 from torch import Tensor, nn
 
+from loop.segmentation.decoding import shrink
 from loop.segmentation.network import DeepLab
-from loop.segmentation.photos import UInt8Array
+from loop.segmentation.photos import Photo, UInt8Array
 
 OPSET = 17
+CALIBRATION_STRIDE = 6
 FLOAT_LAYERS = 2
 """Convolutions that int8 would hurt most, the stem and its first filter, whose few channels differ much in range."""
 INPUT, LOGITS, FEATURES = "image", "logits", "features"
@@ -67,6 +69,11 @@ def _fold_pads(model: onnx.ModelProto) -> onnx.ModelProto:
     for pad in pads.values():
         model.graph.node.remove(pad)
     return model
+
+
+def write_calibrated(network: DeepLab, path: Path, photos: Sequence[Photo], size: tuple[int, int]) -> None:
+    """Quantise a network to int8 with every sixth of the photos that it was trained on, at ``size`` (width, height)."""
+    write_int8(network, path, (shrink(photo.color, size) for photo in photos[::CALIBRATION_STRIDE]))
 
 
 class _Photos(CalibrationDataReader):  # type: ignore[misc]

@@ -15,8 +15,8 @@ from torch import Tensor
 from loop.segmentation.augmentation import paste_patch, random_view
 from loop.segmentation.checkpoint import load_weights, read_tensors, save_atomically, save_weights
 from loop.segmentation.classes import CLASS_COUNT
-from loop.segmentation.decoding import input_size, shrink
-from loop.segmentation.export import write_int8
+from loop.segmentation.decoding import input_size
+from loop.segmentation.export import write_calibrated
 from loop.segmentation.network import DeepLab, build_mobilenet_deeplab
 from loop.segmentation.onnx import load_graph
 from loop.segmentation.photos import Photo, UInt8Array, read_photos
@@ -29,7 +29,6 @@ from semslam.geometry import Float32Array
 
 UNDER_ANSWERS = (slice(2, None, 4), slice(2, None, 4))
 LOG_STEPS = 20
-CALIBRATION_STRIDE = 6
 NORM_IMAGES = 16
 WEIGHT_LIMITS = (0.3, 4.0)
 
@@ -238,8 +237,7 @@ class _Run:
     def finish(self) -> Path:
         """Save all, and write what is made once: the int8 graph and the curve."""
         self.save()
-        photos = (shrink(photo.color, self.size) for photo in self.photos[::CALIBRATION_STRIDE])
-        write_int8(self._averaged(), self.out / "weights.onnx", photos)
+        write_calibrated(self._averaged(), self.out / "weights.onnx", self.photos, self.size)
         if (self.out / "training.csv").exists():
             plot_log(self.out / "training.csv", self.out / "training.png")
         return self.out / "weights.pt"

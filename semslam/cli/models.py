@@ -1,4 +1,4 @@
-"""semslam segment, train-segmenter, eval-segmenter."""
+"""semslam segment, train-segmenter, average-segmenters, eval-segmenter."""
 
 import json
 from dataclasses import asdict
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     from loop.segmentation.evaluation import SegmentationScore
     from loop.segmentation.training import Progress
+    from semslam.config import Config
     from semslam.types import UInt8Array
 
 IMAGES = (".png", ".jpg", ".jpeg")
@@ -62,8 +63,6 @@ def train_command(
     seed: options.Seed = None,
 ) -> None:
     """Train the segmentation network; a killed training goes on where it stopped."""
-    from loop.segmentation.build import build_segmenter
-    from loop.segmentation.evaluation import evaluate
     from loop.segmentation.training import train
     from semslam.results import writing
 
@@ -74,10 +73,34 @@ def train_command(
             update(progress.step, progress.steps)
 
         weights = train(directory, chosen, out_directory, report)
+    _report_weights(weights, directory, chosen)
+
+
+def average_command(
+    directory: Photos,
+    weights: Annotated[list[Path], typer.Argument(help="Checkpoints of trainings that began alike.")],
+    out_directory: Annotated[Path, typer.Option("--out", help="Folder of the mean's weights.")],
+    config: options.ConfigFile = None,
+    overrides: options.Settings = None,
+) -> None:
+    """Average the weights of trained segmentation networks into one network."""
+    from loop.segmentation.averaging import average
+    from semslam.results import writing
+
+    chosen = options.settings(config, overrides)
+    with writing(out_directory):
+        mean = average(directory, weights, chosen, out_directory)
+    _report_weights(mean, directory, chosen)
+
+
+def _report_weights(weights: Path, directory: Path, config: "Config") -> None:
+    from loop.segmentation.build import build_segmenter
+    from loop.segmentation.evaluation import evaluate
+
     out.print(f"Weights: {weights}", soft_wrap=True)
     if (directory / "val.txt").exists():
-        section = chosen.segmentation.model_copy(update={"name": "torch", "weights": weights})
-        _print_score(evaluate(build_segmenter(chosen.with_changes(segmentation=section)), directory), "val.txt")
+        section = config.segmentation.model_copy(update={"name": "torch", "weights": weights})
+        _print_score(evaluate(build_segmenter(config.with_changes(segmentation=section)), directory), "val.txt")
 
 
 def evaluate_command(
@@ -154,6 +177,12 @@ COMMANDS = (
         train_command,
         "Train the segmentation network on labelled photos; a killed training goes on where it stopped.",
         example("semslam train-segmenter nyuv2 --out training --set training.start=ade20k.pt"),
+    ),
+    Command(
+        "average-segmenters",
+        average_command,
+        "Average the weights of trained segmentation networks into one network.",
+        example("semslam average-segmenters nyuv2 A/weights.pt B/weights.pt --out mean"),
     ),
     Command(
         "eval-segmenter",

@@ -1,0 +1,59 @@
+"""One network out of several that were trained from the same start: the mean of their weights.
+
+Such networks lie in one basin of the loss, and their mean is often better than each of them (Wortsman et al.,
+Model soups, ICML 2022); it costs nothing at run time.
+"""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import torch
+
+from loop.segmentation.checkpoint import load_weights, save_weights
+from loop.segmentation.decoding import input_size
+from loop.segmentation.export import write_calibrated
+from loop.segmentation.network import DeepLab, build_mobilenet_deeplab
+from loop.segmentation.photos import read_photos
+from semslam.config import Config
+
+
+def average(directory: Path, weights: Sequence[Path], config: Config, out: Path) -> Path:
+    """Write the mean of several networks: ``weights.pt`` (float16) and ``weights.onnx`` (int8).
+
+    Args:
+        directory: in the NYUv2 layout; photos of its training part calibrate the int8 graph.
+        weights: checkpoints of ``semslam train-segmenter``.
+        config: its section ``segmentation`` gives the size that int8 is calibrated at.
+        out: folder to write to.
+
+    Returns:
+        The path of the float16 weights.
+
+    Raises:
+        DatasetError: the folder is not in the NYUv2 layout.
+        ModelError: a checkpoint is missing, damaged or of another network.
+        ConfigError: the input size does not fit the network.
+    """
+    size, photos = input_size(config.segmentation), read_photos(directory, "train.txt")
+    network = mean_network(weights)
+    save_weights(network, out / "weights.pt")
+    write_calibrated(network, out / "weights.onnx", photos, size)
+    return out / "weights.pt"
+
+
+@torch.no_grad()
+def mean_network(weights: Sequence[Path]) -> DeepLab:
+    """The network whose every weight is the mean of the given networks' weights.
+
+    Raises:
+        ModelError: a checkpoint is missing, damaged or of another network.
+    """
+    total, other = build_mobilenet_deeplab(), build_mobilenet_deeplab()
+    load_weights(total, weights[0])
+    for count, path in enumerate(weights[1:], start=2):
+        load_weights(other, path)
+        addends = other.state_dict()
+        for name, value in total.state_dict().items():
+            if value.is_floating_point():
+                value.lerp_(addends[name], 1.0 / count)
+    return total
