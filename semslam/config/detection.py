@@ -84,7 +84,7 @@ class SemanticConfig(Section):
     max_distance: float = Field(0.1, gt=0, description="node distance as a share of the larger image side")
     distance: DistanceReading = Field(DistanceReading.IMAGE, description="what the node distance is taken between")
     matching: MatchReading = Field(MatchReading.ONE_TO_ONE, description="which similar nodes are counted")
-    min_node_share: float = Field(0.2, ge=0, le=1, description="share of similar nodes that makes a candidate")
+    min_node_share: float = Field(0.1, ge=0, le=1, description="share of similar nodes that makes a candidate")
     node_share: ShareReading = Field(ShareReading.DICE, description="what the count of similar nodes is divided by")
 
 
