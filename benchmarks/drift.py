@@ -256,8 +256,8 @@ def spread(metres: Iterable[float]) -> str:
     if not known:
         return "-"
     if len(known) == 1:
-        return f"{known[0]:.1f}"
-    return f"{statistics.median(known):.1f} ({min(known):.1f} to {max(known):.1f})"
+        return f"{known[0]:.2f}"
+    return f"{statistics.median(known):.2f} ({min(known):.2f} to {max(known):.2f})"
 
 
 def main() -> None:
