@@ -34,6 +34,20 @@ def test_each_block_of_a_label_gives_its_centroid_and_the_depth_there() -> None:
     assert nodes.areas.tolist() == [60 * 640, 41 * 41, 21 * 21]
 
 
+@given(st.integers(0, 10_000))
+def test_labels_in_squares_give_the_nodes_that_they_would_give_at_full_size(seed: int) -> None:
+    """A row of void more makes the height odd, so that nothing can be halved."""
+    rng = np.random.default_rng(seed)
+    labels = rng.integers(0, 3, (8, 11)).repeat(2, 0).repeat(2, 1)
+    depth = rng.uniform(0.5, 4.0, (17, 22)).astype(np.float32)
+    halved = extract_nodes(label_map(labels), depth[:16], PLAIN)
+    whole = extract_nodes(label_map(np.vstack([labels, np.zeros((1, 22), int)])), depth, PLAIN)
+    rows = [
+        sorted(zip(n.labels.tolist(), n.areas.tolist(), n.uvd.round(9).tolist(), strict=True)) for n in (halved, whole)
+    ]
+    assert rows[0] == rows[1]
+
+
 def test_nodes_without_depth_can_be_left_out() -> None:
     nodes = extract_nodes(*scene(), PLAIN.model_copy(update={"keep_without_depth": False}))
     assert len(nodes.of(2)) == 1
