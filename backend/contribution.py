@@ -40,7 +40,7 @@ def leave_one_out(solution: GraphSolution, config: BackendConfig) -> Iterator[Co
         GraphError: the optimiser failed.
     """
     accepted = [verdict.constraint for verdict in solution.verdicts if verdict.accepted]
-    factors = _factors(solution, len(accepted))
+    factors = _factors(solution)
     offset = len(factors) - len(accepted)
     values = least_squares(_graph(factors), make_values(solution.poses), config.max_iterations)
     whole, poses_with = 2.0 * _graph(factors).error(values), read_poses(values, solution.poses)
@@ -52,7 +52,7 @@ def leave_one_out(solution: GraphSolution, config: BackendConfig) -> Iterator[Co
         yield Contribution(constraint, tension, _shift(poses, poses_with), poses, poses_with)
 
 
-def _factors(solution: GraphSolution, accepted: int) -> list[gtsam.NonlinearFactor]:
+def _factors(solution: GraphSolution) -> list[gtsam.NonlinearFactor]:
     """Covisible keyframes, anchors, odometry, then the accepted loops."""
     firm = solution.anchors[0]
     factors: list[gtsam.NonlinearFactor] = [
@@ -61,11 +61,7 @@ def _factors(solution: GraphSolution, accepted: int) -> list[gtsam.NonlinearFact
     ]
     # Odometry that hangs together by a loop alone needs a hold of its own once that loop is gone.
     factors += [prior_factor(key, pose, FLOATING_SIGMA) for key, pose in solution.poses.items()]
-    odometry = len(solution.edges) - accepted
-    for index, edge in enumerate(solution.edges):
-        scale = solution.odometry_scale if index < odometry else solution.loop_scale
-        factors.append(between_factor(edge.widened(scale)))
-    return [*map(between_factor, solution.covisible), *factors]
+    return [*map(between_factor, solution.covisible), *factors, *map(between_factor, solution.widened)]
 
 
 def _graph(factors: list[gtsam.NonlinearFactor]) -> gtsam.NonlinearFactorGraph:

@@ -180,10 +180,8 @@ class IncrementalPoseGraph:
             sigma = ANCHOR_SIGMA if key == solution.anchors[0] else FLOATING_SIGMA
             graph.add(prior_factor(key, solution.poses[key], sigma))
             self._map_of.update(dict.fromkeys(component, component[0]))
-        odometry = len(solution.edges) - len(accepted)
-        for index, edge in enumerate(solution.edges):
-            scale = self._odometry_scale if index < odometry else self._loop_scale
-            graph.add(between_factor(edge.widened(scale)))
+        for edge in solution.widened:
+            graph.add(between_factor(edge))
         self._isam, self._known_error = _new_isam(), None
         slots = self._isam.update(graph, make_values(solution.poses)).getNewFactorsIndices()
         pairs = [_pair(verdict.constraint) for verdict in accepted]

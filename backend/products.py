@@ -91,6 +91,26 @@ class GraphSolution:
     covariances: dict[int, FloatArray] | None = None
     covisible: tuple[Edge, ...] = ()
 
+    @property
+    def odometry(self) -> tuple[Edge, ...]:
+        """Odometry's edges, as they were stated."""
+        return self.edges[: len(self.edges) - self._accepted]
+
+    @property
+    def loops(self) -> tuple[Edge, ...]:
+        """The accepted loops, as they were stated."""
+        return self.edges[len(self.edges) - self._accepted :]
+
+    @property
+    def widened(self) -> list[Edge]:
+        """Odometry, then the accepted loops, as far as they were believed."""
+        odometry = [edge.widened(self.odometry_scale) for edge in self.odometry]
+        return odometry + [edge.widened(self.loop_scale) for edge in self.loops]
+
+    @property
+    def _accepted(self) -> int:
+        return sum(verdict.accepted for verdict in self.verdicts)
+
 
 def loop_edge(constraint: LoopConstraint) -> Edge:
     """The edge, match to query, of a verified loop.

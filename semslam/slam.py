@@ -300,9 +300,7 @@ class Slam:
     def _adjusted(self, solution: GraphSolution) -> GraphSolution:
         """The solution with its poses after bundle adjustment of the landmarks that the odometry keeps."""
         intrinsics = self._keyframes[0].intrinsics
-        first_loop = len(solution.edges) - sum(verdict.accepted for verdict in solution.verdicts)
-        loops = discounted(solution.edges[first_loop:])
-        edges = (*solution.edges[:first_loop], *loops, *solution.covisible)
+        edges = (*solution.odometry, *discounted(solution.loops), *solution.covisible)
         result = adjust(solution.poses, self._observations, intrinsics, self._config.backend.bundle, edges)
         return replace(solution, poses=result.poses)
 
