@@ -1,5 +1,7 @@
 """Where the camera will be, before its image is looked at; and what to say of a frame that could not be tracked."""
 
+from collections import deque
+
 import numpy as np
 
 from semslam.errors import DatasetError
@@ -8,6 +10,7 @@ from semslam.types import FloatArray, Frame, Motion, TrackingStatus
 
 COAST_SECONDS = 0.3
 """How long a lost camera is taken to keep its velocity; after that it is taken to rest."""
+RECENT_SECONDS = 1.0
 LOST_ROTATION = 1.0
 LOST_TRANSLATION = 0.5
 """Radians and metres, standard deviations after one lost second; they grow with the square root of time."""
@@ -37,8 +40,7 @@ class ConstantVelocity:
         elapsed = timestamp - self._timestamp if self._timestamp is not None else 0.0
         known = elapsed > 0 and self._timestamp == self._tracked_at
         # After a lost spell the motion holds the error of the prediction too; it is no velocity.
-        tangent = np.concatenate([log_so3(T_prev_cur[:3, :3]), T_prev_cur[:3, 3]])
-        self._velocity = tangent / elapsed if known else np.zeros(6)
+        self._velocity = tangent(T_prev_cur) / elapsed if known else np.zeros(6)
         self._timestamp = self._tracked_at = timestamp
 
     def lost(self, timestamp: float, map_id: int) -> Motion:
@@ -47,6 +49,35 @@ class ConstantVelocity:
         elapsed = timestamp - self._timestamp if self._timestamp is not None else 0.0
         self._timestamp = timestamp
         return Motion(motion, wide_covariance(elapsed), TrackingStatus.LOST, map_id)
+
+
+class RecentVelocity:
+    """The camera's mean velocity over the last second, from which a registration that slips departs."""
+
+    def __init__(self) -> None:
+        self._last: float | None = None
+        self._velocities: deque[tuple[float, FloatArray]] = deque()
+
+    def departure(self, timestamp: float, T_prev_cur: FloatArray) -> FloatArray:
+        """How far a motion since the last frame departs from it, (6,) in radians and metres; then take it in.
+
+        Nothing where there is no motion to compare it with.
+        """
+        elapsed = 0.0 if self._last is None else timestamp - self._last
+        self._last = timestamp
+        while self._velocities and timestamp - self._velocities[0][0] > RECENT_SECONDS:
+            self._velocities.popleft()
+        if elapsed <= 0:
+            return np.zeros(6)
+        velocity = tangent(T_prev_cur) / elapsed
+        before = [known for _, known in self._velocities]
+        self._velocities.append((timestamp, velocity))
+        return (velocity - np.mean(before, axis=0)) * elapsed if before else np.zeros(6)
+
+
+def tangent(T: FloatArray) -> FloatArray:
+    """A small motion (4, 4) as rotation vector and translation (6,)."""
+    return np.concatenate([log_so3(T[:3, :3]), T[:3, 3]])
 
 
 def wide_covariance(seconds: float) -> FloatArray:

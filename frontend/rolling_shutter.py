@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from semslam.geometry import log_so3
+from frontend.prediction import tangent
 from semslam.reprojection import Measurements, pose_jacobians, project_stereo
 from semslam.types import Features, FloatArray, Intrinsics
 
@@ -26,7 +26,7 @@ TRUST = 1e-2
 
 def velocity_of(T_prev_cur: FloatArray, seconds: float) -> FloatArray:
     """Angular and linear velocity (6,) of a camera that moved by T_prev_cur (4, 4) in a time."""
-    return np.concatenate([log_so3(T_prev_cur[:3, :3]), T_prev_cur[:3, 3]]) / max(seconds, 1e-3)
+    return tangent(T_prev_cur) / max(seconds, 1e-3)
 
 
 def rectify(features: Features, camera: Intrinsics, velocity: FloatArray, readout: float) -> Features:
