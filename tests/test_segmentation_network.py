@@ -5,7 +5,7 @@ import pytest
 import torch
 import torch.nn.functional as F  # noqa: N812
 
-from loop.segmentation.checkpoint import SHIPPED, load_weights, save_weights
+from loop.segmentation.checkpoint import SHIPPED, load_network, save_weights
 from loop.segmentation.fast_layers import dilated_depthwise, enlarge
 from loop.segmentation.network import ConvNorm, build_mobilenet_deeplab, count_multiply_adds, count_parameters
 from loop.segmentation.pretrained import convert_ade20k, refresh_norms
@@ -78,15 +78,14 @@ def test_refreshed_norms_leave_the_function_and_hold_the_statistics():
 def test_checkpoint_round_trip_is_float16(tmp_path):
     network = build_mobilenet_deeplab()
     save_weights(network, tmp_path / "w.pt")
-    other = build_mobilenet_deeplab()
-    load_weights(other, tmp_path / "w.pt")
+    other = load_network(tmp_path / "w.pt")
     for a, b in zip(network.state_dict().values(), other.state_dict().values(), strict=True):
         assert torch.allclose(a.float(), b.float(), rtol=1e-3, atol=1e-6)
 
 
 def test_shipped_checkpoint_is_small_and_fits():
     assert SHIPPED.stat().st_size < 8_000_000
-    load_weights(build_mobilenet_deeplab(), SHIPPED)
+    load_network(SHIPPED)
 
 
 @pytest.mark.parametrize("content", [b"", b"not a checkpoint", b"PK\x03\x04 truncated"])
@@ -94,27 +93,27 @@ def test_damaged_checkpoint_is_one_sentence(tmp_path, content):
     path = tmp_path / "w.pt"
     path.write_bytes(content)
     with pytest.raises(ModelError, match="damaged"):
-        load_weights(build_mobilenet_deeplab(), path)
+        load_network(path)
 
 
 def test_truncated_checkpoint_is_one_sentence(tmp_path):
     path = tmp_path / "w.pt"
     path.write_bytes(SHIPPED.read_bytes()[:100_000])
     with pytest.raises(ModelError, match="damaged"):
-        load_weights(build_mobilenet_deeplab(), path)
+        load_network(path)
 
 
 def test_checkpoint_of_another_network_is_one_sentence(tmp_path):
     torch.save({"weight": torch.zeros(3)}, tmp_path / "w.pt")
     with pytest.raises(ModelError, match="another network"):
-        load_weights(build_mobilenet_deeplab(), tmp_path / "w.pt")
+        load_network(tmp_path / "w.pt")
     with pytest.raises(ModelError, match="does not hold"):
         convert_ade20k(build_mobilenet_deeplab(), tmp_path / "w.pt")
 
 
 def test_missing_checkpoint_is_one_sentence(tmp_path):
     with pytest.raises(ModelError, match="no network weights"):
-        load_weights(build_mobilenet_deeplab(), tmp_path / "w.pt")
+        load_network(tmp_path / "w.pt")
 
 
 def test_ade20k_start_already_knows_rooms(shared):

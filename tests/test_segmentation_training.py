@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 from loop.segmentation.augmentation import paste_patch, random_view
 from loop.segmentation.averaging import average
 from loop.segmentation.build import build_segmenter
-from loop.segmentation.checkpoint import SHIPPED, read_tensors
+from loop.segmentation.checkpoint import SHIPPED, read_tensors, save_weights
 from loop.segmentation.evaluation import confusion_matrix, evaluate, score
+from loop.segmentation.network import build_mobilenet_deeplab
 from loop.segmentation.onnx import load_graph
 from loop.segmentation.photos import Photo, read_photo
 from loop.segmentation.self_training import Teacher, teach
@@ -41,9 +42,9 @@ def rooms(tmp_path):
     return folder
 
 
-def settings(**training):
+def settings(seed=0, **training):
     values = {"epochs": 2, "batch": 2, "save_every": 1e-9, "average": 0.5, **training}
-    return load_config(overrides={"training": values, "segmentation": SIZE})
+    return load_config(overrides={"seed": seed, "training": values, "segmentation": SIZE})
 
 
 class KilledError(Exception):
@@ -212,6 +213,28 @@ def test_the_mean_of_networks_lies_between_them(rooms, tmp_path):
     assert load_graph(tmp_path / "mean" / "weights.onnx", "int8")
     with pytest.raises(ModelError, match="no network weights"):
         average(rooms, [paths[0], tmp_path / "absent.pt"], config, tmp_path / "mean")
+
+
+def test_networks_of_different_widths_have_no_mean(rooms, tmp_path):
+    save_weights(build_mobilenet_deeplab(decoder_channels=32), tmp_path / "narrow.pt")
+    with pytest.raises(ModelError, match="width"):
+        average(rooms, [SHIPPED, tmp_path / "narrow.pt"], settings(), tmp_path / "mean")
+
+
+def test_trainings_from_one_start_keep_the_same_channels(rooms, tmp_path):
+    """Whatever the seed, or their networks would have no mean."""
+    first, second = (
+        read_tensors(
+            train(
+                rooms,
+                settings(start=str(SHIPPED), decoder_channels=32, freeze_norms=True, rate=1e-9, seed=s),
+                tmp_path / f"{s}",
+            )
+        )
+        for s in (0, 1)
+    )
+    assert first["classifier.weight"].shape == (40, 32, 1, 1)
+    assert all(torch.allclose(first[name], second[name], atol=1e-3) for name in first if "decoder" in name)
 
 
 def test_scores_of_a_case_done_by_hand():

@@ -9,12 +9,13 @@ from pathlib import Path
 
 import torch
 
-from loop.segmentation.checkpoint import load_weights, save_weights
+from loop.segmentation.checkpoint import load_network, save_weights
 from loop.segmentation.decoding import input_size
 from loop.segmentation.export import write_calibrated
-from loop.segmentation.network import DeepLab, build_mobilenet_deeplab
+from loop.segmentation.network import DeepLab
 from loop.segmentation.photos import read_photos
 from semslam.config import Config
+from semslam.errors import ModelError
 
 
 def average(directory: Path, weights: Sequence[Path], config: Config, out: Path) -> Path:
@@ -48,10 +49,11 @@ def mean_network(weights: Sequence[Path]) -> DeepLab:
     Raises:
         ModelError: a checkpoint is missing, damaged or of another network.
     """
-    total, other = build_mobilenet_deeplab(), build_mobilenet_deeplab()
-    load_weights(total, weights[0])
+    total = load_network(weights[0])
     for count, path in enumerate(weights[1:], start=2):
-        load_weights(other, path)
+        other = load_network(path)
+        if other.decoder_channels != total.decoder_channels:
+            raise ModelError(f"The decoder of {path} is of another width than that of {weights[0]}.")
         addends = other.state_dict()
         for name, value in total.state_dict().items():
             if value.is_floating_point():

@@ -7,6 +7,7 @@ from pathlib import Path
 import torch
 from torch import Tensor, nn
 
+from loop.segmentation.network import DeepLab, build_mobilenet_deeplab
 from semslam.errors import ModelError
 
 SHIPPED = Path(__file__).parent / "weights" / "deeplabv3plus_mobilenetv2_nyu40.pt"
@@ -29,17 +30,19 @@ def read_tensors(path: Path) -> dict[str, Tensor]:
     return {name: v.float() if v.is_floating_point() else v for name, v in state.items()}
 
 
-def load_weights(network: nn.Module, path: Path) -> None:
-    """Load a checkpoint into a network of the same make.
+def load_network(path: Path) -> DeepLab:
+    """The MobileNetV2 network of a checkpoint, with a decoder as wide as it was trained.
 
     Raises:
         ModelError: the file cannot be read or belongs to another network.
     """
     state = read_tensors(path)
     try:
+        network = build_mobilenet_deeplab(decoder_channels=state["classifier.weight"].shape[1])
         network.load_state_dict(state)
-    except RuntimeError as error:
+    except (KeyError, IndexError, RuntimeError) as error:
         raise ModelError(f"The weights {path} belong to another network than the one asked for.") from error
+    return network
 
 
 def save_weights(network: nn.Module, path: Path) -> None:

@@ -15,6 +15,7 @@ from loop.segmentation.fast_layers import dilated_depthwise, enlarge
 
 LOW_CHANNELS = 48
 ASPP_CHANNELS = 256
+DECODER_CHANNELS = 256
 ATROUS_RATES = (3, 6, 9)
 # expansion, channels, blocks, stride (Sandler et al., CVPR 2018, Table 2); the last stride of 2 is given up for
 # a dilation of 2, which keeps the encoder at output stride 16.
@@ -153,18 +154,23 @@ class DeepLab(nn.Module):
         encoder: gives an ``Encoding`` and names its channels.
         classes: number of classes without void.
         dropout: share of channels dropped before the classifier in training.
+        decoder_channels: outputs of both of the decoder's layers.
     """
 
-    def __init__(self, encoder: Encoder, classes: int = 40, dropout: float = 0.1) -> None:
+    def __init__(
+        self, encoder: Encoder, classes: int = 40, dropout: float = 0.1, decoder_channels: int = DECODER_CHANNELS
+    ) -> None:
         super().__init__()
+        self.decoder_channels = decoder_channels
         self.encoder = encoder
         self.aspp = AtrousPyramid(encoder.high_channels)
         self.low = ConvNorm(encoder.low_channels, LOW_CHANNELS)
         self.decoder = nn.Sequential(
-            SeparableConv(ASPP_CHANNELS + LOW_CHANNELS, ASPP_CHANNELS), SeparableConv(ASPP_CHANNELS, ASPP_CHANNELS)
+            SeparableConv(ASPP_CHANNELS + LOW_CHANNELS, decoder_channels),
+            SeparableConv(decoder_channels, decoder_channels),
         )
         self.dropout = nn.Dropout2d(dropout)
-        self.classifier = nn.Conv2d(ASPP_CHANNELS, classes, 1)
+        self.classifier = nn.Conv2d(decoder_channels, classes, 1)
 
     def forward(self, x: Tensor) -> tuple[Tensor, Tensor]:
         """Images (B, 3, H, W) to logits (B, classes, H/4, W/4) and mid-level features (B, C, H/16, W/16)."""
@@ -176,9 +182,9 @@ class DeepLab(nn.Module):
         return self.classifier(self.dropout(decoded)), encoding.middle
 
 
-def build_mobilenet_deeplab(classes: int = 40) -> DeepLab:
-    """The shipped network: 40 NYUv2 classes, MobileNetV2."""
-    return DeepLab(MobileNetV2(), classes)
+def build_mobilenet_deeplab(classes: int = 40, decoder_channels: int = DECODER_CHANNELS) -> DeepLab:
+    """The paper's network with a MobileNetV2: 40 NYUv2 classes."""
+    return DeepLab(MobileNetV2(), classes, decoder_channels=decoder_channels)
 
 
 def count_parameters(network: nn.Module) -> int:

@@ -67,13 +67,10 @@ def load_graph(weights: Path | None, precision: str) -> bytes:
     """
     path = weights or (SHIPPED_INT8 if precision == "int8" else SHIPPED)
     if path.suffix != ".onnx":
-        from loop.segmentation.checkpoint import load_weights
+        from loop.segmentation.checkpoint import load_network
         from loop.segmentation.export import float_graph
-        from loop.segmentation.network import build_mobilenet_deeplab
 
-        network = build_mobilenet_deeplab()
-        load_weights(network, path)
-        return float_graph(network)
+        return float_graph(load_network(path))
     try:
         return path.read_bytes()
     except OSError as error:

@@ -6,10 +6,9 @@ from typing import Self
 
 import torch
 
-from loop.segmentation.checkpoint import SHIPPED, load_weights
+from loop.segmentation.checkpoint import SHIPPED, load_network
 from loop.segmentation.classes import NYU40_NAMES
 from loop.segmentation.decoding import decode, input_size, shrink
-from loop.segmentation.network import build_mobilenet_deeplab
 from loop.segmentation.photos import UInt8Array
 from semslam.config import Config
 from semslam.types import LabelMap
@@ -29,8 +28,7 @@ class TorchSegmenter:
     """
 
     def __init__(self, weights: Path, size: tuple[int, int], threads: int = 1, min_confidence: float = 0.0) -> None:
-        self._network = build_mobilenet_deeplab()
-        load_weights(self._network, weights)
+        self._network = load_network(weights)
         self._network.eval()
         torch.set_num_threads(threads)
         self._size, self._min_confidence = size, min_confidence

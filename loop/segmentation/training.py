@@ -1,7 +1,7 @@
 """Training on NYUv2-layout folders: resumable at any moment, and the same views for the same seed."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,11 +13,12 @@ import torch.nn.functional as F  # noqa: N812
 from torch import Tensor
 
 from loop.segmentation.augmentation import paste_patch, random_view
-from loop.segmentation.checkpoint import load_weights, read_tensors, save_atomically, save_weights
+from loop.segmentation.checkpoint import load_network, read_tensors, save_atomically, save_weights
 from loop.segmentation.classes import CLASS_COUNT
-from loop.segmentation.decoding import input_size
+from loop.segmentation.decoding import input_size, shrink
 from loop.segmentation.export import write_calibrated
-from loop.segmentation.network import DeepLab, build_mobilenet_deeplab
+from loop.segmentation.narrowing import narrow_decoder
+from loop.segmentation.network import DECODER_CHANNELS, DeepLab, build_mobilenet_deeplab
 from loop.segmentation.onnx import load_graph
 from loop.segmentation.photos import Photo, UInt8Array, read_photos
 from loop.segmentation.pretrained import convert_ade20k, refresh_norms
@@ -131,9 +132,7 @@ class _Run:
             np.float32
         )
         torch.manual_seed(self.seed)
-        self.network = build_mobilenet_deeplab()
-        if settings.start is not None:
-            self._start_from(settings.start)
+        self.network = self._beginning()
         self.network.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
         self.frozen = self.network.encoder.early_layers() if settings.freeze_early else []
         for layer in self.frozen:
@@ -145,13 +144,22 @@ class _Run:
         self.losses: list[float] = []
         self.saved_at = time.monotonic()
 
-    def _start_from(self, path: Path) -> None:
+    def _beginning(self) -> DeepLab:
+        """The network before the first step."""
+        path, channels = self.settings.start, self.settings.decoder_channels
+        if path is None:
+            return build_mobilenet_deeplab(decoder_channels=channels or DECODER_CHANNELS)
         if "cls.weight" in read_tensors(path):
-            convert_ade20k(self.network, path)
-            views = self._batch(np.random.default_rng((self.seed, 0)), NORM_IMAGES)[0]
-            refresh_norms(self.network, views)
+            network = build_mobilenet_deeplab()
+            convert_ade20k(network, path)
+            refresh_norms(network, self._batch(np.random.default_rng((self.seed, 0)), NORM_IMAGES)[0])
         else:
-            load_weights(self.network, path)
+            network = load_network(path)
+        if channels is None:
+            return network
+        # Whole photos, whatever the seed: trainings from one start keep the same channels and have a mean.
+        photos = [shrink(photo.color, self.size) for photo in self.photos[:: -(-len(self.photos) // NORM_IMAGES)]]
+        return narrow_decoder(network, channels, to_input(photos))
 
     def _batch(self, rng: np.random.Generator, count: int) -> tuple[Tensor, Tensor]:
         """Views (B, 3, H, W) in -1..1 and targets (B, 40, H/4, W/4): a weight for each class, all 0 where void."""
@@ -162,8 +170,7 @@ class _Run:
                 paste_patch(view, target, *self._draw(rng), rng)
             views.append(view)
             targets.append(target)
-        images = torch.from_numpy(np.stack(views)).permute(0, 3, 1, 2).float() / 127.5 - 1.0
-        return images, torch.from_numpy(np.stack(targets)).permute(0, 3, 1, 2)
+        return to_input(views), torch.from_numpy(np.stack(targets)).permute(0, 3, 1, 2)
 
     def _draw(self, rng: np.random.Generator) -> tuple[UInt8Array, Float32Array]:
         """A view (H, W, 3) and its target (H/4, W/4, 40)."""
@@ -230,7 +237,7 @@ class _Run:
         self.saved_at = time.monotonic()
 
     def _averaged(self) -> DeepLab:
-        network = build_mobilenet_deeplab()
+        network = build_mobilenet_deeplab(decoder_channels=self.network.decoder_channels)
         network.load_state_dict(self.average)
         return network
 
@@ -257,6 +264,11 @@ class _Run:
             raise ModelError(f"The training state {path} is damaged; remove it to start afresh.") from error
         if steps != self.steps:
             raise ModelError(f"The training in {self.out} was begun with other settings; choose another folder.")
+
+
+def to_input(images: Sequence[UInt8Array]) -> Tensor:
+    """RGB images (H, W, 3) as the network's input (B, 3, H, W) in -1..1."""
+    return torch.from_numpy(np.stack(images)).permute(0, 3, 1, 2).float() / 127.5 - 1.0
 
 
 def soft_cross_entropy(logits: Tensor, targets: Tensor) -> Tensor:
