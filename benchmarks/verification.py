@@ -1,12 +1,14 @@
 """Measure the verification on posed sequences: poses found, wrong places accepted, covariances against the truth.
 
-    python benchmarks/verification.py SEQ... [--every 5] [--detector fused] [--icp colored] [--kinds 4]
+    python benchmarks/verification.py SEQ... [--every 5] [--detector fused] [--icp colored] [--neighbours] [--kinds 4]
 
 All sequences go into one database, one after the other; the detector proposes across them. Printed for each sequence:
 queries that have a true past loop and the share of them that gets a pose within 0.2 m and 10 degrees, loops verified,
 those with a pose that is off, those of a wrong place, pose errors, and the mean and percentiles of the normalised
-squared error (six degrees of freedom, so 6 is exact). With ``--kinds N`` every N-th verified pair is verified again
-with each kind of ICP, in turns: how many stay verified, their pose errors, and processor time.
+squared error (six degrees of freedom, so 6 is exact). With ``--neighbours`` also how far each loop lies from the
+nearest one between neighbours of its keyframes, were the odometry between them exact. With ``--kinds N`` every N-th
+verified pair is verified again with each kind of ICP, in turns: how many stay verified, their pose errors, and
+processor time.
 """
 
 import argparse
@@ -32,6 +34,8 @@ from semslam.types import Keyframe, KeyframeView, LoopConstraint
 
 PAUSE = 1000.0
 """Seconds put between two sequences."""
+NEIGHBOURS = 2
+"""Keyframes by which the ends of a neighbouring loop may lie apart."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -133,6 +137,30 @@ def compare_kinds(part: Part, known: list[Keyframe], every: int) -> None:
         )
 
 
+def ask_neighbours(part: Part) -> None:
+    """Print how far loops lie from the nearest loop of neighbouring keyframes, by exact odometry between them."""
+    here = [loop for loop in part.loops if loop.candidate.match >= part.first]
+    ends = np.array([(loop.candidate.query, loop.candidate.match) for loop in here]) - part.first
+    gaps: dict[str, list[float]] = {"right": [], "off": [], "of a wrong place": []}
+    alone = dict.fromkeys(gaps, 0)
+    for loop, (query, match) in zip(here, ends, strict=True):
+        E = error_of(part, loop)
+        kind = "right" if np.linalg.norm(E[:3, 3]) <= POSE_TOLERANCE else "off"
+        kind = "of a wrong place" if part.truth.false_pairs[query, match] else kind
+        near = np.abs(ends - (query, match)).max(1)
+        beside = np.flatnonzero((near > 0) & (near <= NEIGHBOURS)).tolist()
+        alone[kind] += not beside
+        said = [
+            part.poses[ends[i, 1]] @ here[i].T_match_query @ invert(part.poses[ends[i, 0]]) @ part.poses[query]
+            for i in beside
+        ]
+        away = [np.linalg.norm((invert(part.poses[match] @ loop.T_match_query) @ T)[:3, 3]) for T in said]
+        gaps[kind] += [100 * float(min(away))] if away else []
+    for kind, distances in gaps.items():
+        spread = np.percentile(distances, [50, 90, 99]).round(1) if distances else "-"
+        print(f"  {kind}: {len(distances)} with a neighbour, {alone[kind]} alone; cm 50/90/99 % {spread}")
+
+
 def error_of(part: Part, loop: LoopConstraint) -> FloatArray:
     """Motion (4, 4) from the true pose of a sequence's loop to the verified one."""
     query, match = loop.candidate.query - part.first, loop.candidate.match - part.first
@@ -146,6 +174,7 @@ def main() -> None:
     parser.add_argument("--every", type=int, default=5)
     parser.add_argument("--detector", default="fused")
     parser.add_argument("--icp", default="point_to_plane")
+    parser.add_argument("--neighbours", action="store_true", help="how far loops lie from their neighbours' loops")
     parser.add_argument("--kinds", type=int, default=0, help="compare kinds of ICP on every n-th verified pair")
     arguments = parser.parse_args()
     config = Config().with_changes(verification={"icp": arguments.icp})
@@ -154,6 +183,8 @@ def main() -> None:
     for path in arguments.sequences:
         part = run(path, arguments.every, config, detector, known)
         report(part)
+        if arguments.neighbours:
+            ask_neighbours(part)
         if arguments.kinds:
             compare_kinds(part, known, arguments.kinds)
 
