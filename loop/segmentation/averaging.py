@@ -12,6 +12,7 @@ import torch
 from loop.segmentation.checkpoint import load_network, save_weights
 from loop.segmentation.decoding import input_size
 from loop.segmentation.export import write_calibrated
+from loop.segmentation.narrowing import narrow_decoder, plain_views
 from loop.segmentation.network import DeepLab
 from loop.segmentation.photos import read_photos
 from semslam.config import Config
@@ -24,7 +25,8 @@ def average(directory: Path, weights: Sequence[Path], config: Config, out: Path)
     Args:
         directory: in the NYUv2 layout; photos of its training part calibrate the int8 graph.
         weights: checkpoints of ``semslam train-segmenter``.
-        config: its section ``segmentation`` gives the size that int8 is calibrated at.
+        config: ``segmentation`` gives the size that int8 is calibrated at; to ``training.decoder_channels`` wider
+            decoders are narrowed first.
         out: folder to write to.
 
     Returns:
@@ -36,24 +38,28 @@ def average(directory: Path, weights: Sequence[Path], config: Config, out: Path)
         ConfigError: the input size does not fit the network.
     """
     size, photos = input_size(config.segmentation), read_photos(directory, "train.txt")
-    network = mean_network(weights)
+    networks = [load_network(path) for path in weights]
+    if config.training.decoder_channels is not None:
+        views = plain_views(photos, size)
+        networks = [narrow_decoder(network, config.training.decoder_channels, views) for network in networks]
+    network = mean_network(networks)
     save_weights(network, out / "weights.pt")
     write_calibrated(network, out / "weights.onnx", photos, size)
     return out / "weights.pt"
 
 
 @torch.no_grad()
-def mean_network(weights: Sequence[Path]) -> DeepLab:
-    """The network whose every weight is the mean of the given networks' weights.
+def mean_network(networks: Sequence[DeepLab]) -> DeepLab:
+    """The first network, its every weight now the mean of all networks' weights.
 
     Raises:
-        ModelError: a checkpoint is missing, damaged or of another network.
+        ModelError: their decoders are not of one width.
     """
-    total = load_network(weights[0])
-    for count, path in enumerate(weights[1:], start=2):
-        other = load_network(path)
+    total = networks[0]
+    for count, other in enumerate(networks[1:], start=2):
         if other.decoder_channels != total.decoder_channels:
-            raise ModelError(f"The decoder of {path} is of another width than that of {weights[0]}.")
+            widths = sorted({network.decoder_channels for network in networks})
+            raise ModelError(f"Networks with decoders of {widths} channels have no mean; narrow them to one width.")
         addends = other.state_dict()
         for name, value in total.state_dict().items():
             if value.is_floating_point():

@@ -4,13 +4,18 @@ Channel pruning by reconstruction (He, Zhang and Sun, Channel pruning for accele
 ICCV 2017), with backward elimination: the layer that reads the channels is fitted anew to the rest.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import torch
 from torch import Tensor, nn
 
-from loop.segmentation.network import DeepLab, build_mobilenet_deeplab
+from loop.segmentation.decoding import shrink
+from loop.segmentation.network import DeepLab, build_mobilenet_deeplab, to_input
+from loop.segmentation.photos import Photo
 from semslam.errors import ModelError
+
+VIEWS = 16
 
 
 class _Fit(NamedTuple):
@@ -19,6 +24,15 @@ class _Fit(NamedTuple):
     kept: Tensor
     weights: Tensor
     offsets: Tensor
+
+
+def plain_views(photos: Sequence[Photo], size: tuple[int, int]) -> Tensor:
+    """Some photos, whole, as the network's input (B, 3, H, W); networks narrowed on them keep the same channels.
+
+    That holds for networks that were trained from one start and differ little.
+    """
+    step = -(-len(photos) // VIEWS)
+    return to_input([shrink(photo.color, size) for photo in photos[::step]])
 
 
 @torch.no_grad()

@@ -5,8 +5,11 @@ Images are RGB scaled to -1..1, their sides multiples of 16. Strided convolution
 symmetric padding the features shift by half a cell at each of the four levels.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
+import numpy as np
+import numpy.typing as npt
 import torch
 import torch.nn.functional as F  # noqa: N812
 from torch import Tensor, nn
@@ -180,6 +183,11 @@ class DeepLab(nn.Module):
         high = enlarge(high, 4) if self.training else F.interpolate(high, scale_factor=4, mode="bilinear")
         decoded = self.decoder(torch.cat([high, low], 1))
         return self.classifier(self.dropout(decoded)), encoding.middle
+
+
+def to_input(images: Sequence[npt.NDArray[np.uint8]]) -> Tensor:
+    """RGB images (H, W, 3) as the network's input (B, 3, H, W) in -1..1."""
+    return torch.from_numpy(np.stack(images)).permute(0, 3, 1, 2).float() / 127.5 - 1.0
 
 
 def build_mobilenet_deeplab(classes: int = 40, decoder_channels: int = DECODER_CHANNELS) -> DeepLab:

@@ -1,7 +1,7 @@
 """Training on NYUv2-layout folders: resumable at any moment, and the same views for the same seed."""
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,10 +15,10 @@ from torch import Tensor
 from loop.segmentation.augmentation import paste_patch, random_view
 from loop.segmentation.checkpoint import load_network, read_tensors, save_atomically, save_weights
 from loop.segmentation.classes import CLASS_COUNT
-from loop.segmentation.decoding import input_size, shrink
+from loop.segmentation.decoding import input_size
 from loop.segmentation.export import write_calibrated
-from loop.segmentation.narrowing import narrow_decoder
-from loop.segmentation.network import DECODER_CHANNELS, DeepLab, build_mobilenet_deeplab
+from loop.segmentation.narrowing import narrow_decoder, plain_views
+from loop.segmentation.network import DECODER_CHANNELS, DeepLab, build_mobilenet_deeplab, to_input
 from loop.segmentation.onnx import load_graph
 from loop.segmentation.photos import Photo, UInt8Array, read_photos
 from loop.segmentation.pretrained import convert_ade20k, refresh_norms
@@ -158,8 +158,7 @@ class _Run:
         if channels is None:
             return network
         # Whole photos, whatever the seed: trainings from one start keep the same channels and have a mean.
-        photos = [shrink(photo.color, self.size) for photo in self.photos[:: -(-len(self.photos) // NORM_IMAGES)]]
-        return narrow_decoder(network, channels, to_input(photos))
+        return narrow_decoder(network, channels, plain_views(self.photos, self.size))
 
     def _batch(self, rng: np.random.Generator, count: int) -> tuple[Tensor, Tensor]:
         """Views (B, 3, H, W) in -1..1 and targets (B, 40, H/4, W/4): a weight for each class, all 0 where void."""
@@ -264,11 +263,6 @@ class _Run:
             raise ModelError(f"The training state {path} is damaged; remove it to start afresh.") from error
         if steps != self.steps:
             raise ModelError(f"The training in {self.out} was begun with other settings; choose another folder.")
-
-
-def to_input(images: Sequence[UInt8Array]) -> Tensor:
-    """RGB images (H, W, 3) as the network's input (B, 3, H, W) in -1..1."""
-    return torch.from_numpy(np.stack(images)).permute(0, 3, 1, 2).float() / 127.5 - 1.0
 
 
 def soft_cross_entropy(logits: Tensor, targets: Tensor) -> Tensor:
