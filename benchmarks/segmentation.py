@@ -18,6 +18,7 @@ import numpy as np
 import torch
 
 from loop.segmentation.build import build_segmenter
+from loop.segmentation.checkpoint import SHIPPED, load_network
 from loop.segmentation.classes import CLASS_COUNT, GROUP_OF_LABEL
 from loop.segmentation.decoding import shrink
 from loop.segmentation.evaluation import confusion_matrix, evaluate, score
@@ -96,12 +97,16 @@ def teachers_table(data: Path, weights: Sequence[Path]) -> None:
 
 
 def size_table() -> None:
-    """Parameters and multiply-adds of both backbones."""
-    print("| network | parameters | multiply-adds at 320x240 |\n|---|---|---|")
-    for name, build in (("MobileNetV2", build_mobilenet_deeplab), ("Xception-65", build_xception_deeplab)):
-        network = build()
-        adds = count_multiply_adds(network, 240, 320)
-        print(f"| {name} | {count_parameters(network) / 1e6:.2f} M | {adds / 1e9:.2f} G |")
+    """Parameters and multiply-adds of the shipped network and of both backbones with the same decoder."""
+    print("| network | decoder's channels | parameters | multiply-adds at 320x240 |\n|---|---|---|---|")
+    networks = {
+        "MobileNetV2, shipped": load_network(SHIPPED),
+        "MobileNetV2": build_mobilenet_deeplab(),
+        "Xception-65": build_xception_deeplab(),
+    }
+    for name, network in networks.items():
+        size = f"{count_parameters(network) / 1e6:.2f} M | {count_multiply_adds(network, 240, 320) / 1e9:.2f} G"
+        print(f"| {name} | {network.decoder_channels} | {size} |")
 
 
 def steady_table(sequence: Path, gap: int, stride: int, segmenters: dict[str, Segmenter]) -> None:
