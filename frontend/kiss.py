@@ -120,7 +120,6 @@ def _make_icp(config: KissConfig) -> Any:
     settings.data.max_range = config.max_range
     settings.data.deskew = False
     settings.mapping.voxel_size = config.voxel
-    settings.adaptive_threshold.initial_threshold = config.initial_threshold
-    settings.adaptive_threshold.min_motion_th = config.min_motion
+    settings.adaptive_threshold.fixed_threshold = config.threshold
     settings.registration.max_num_threads = 1
     return KissICP(settings)

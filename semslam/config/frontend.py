@@ -69,9 +69,8 @@ class KissConfig(Section):
     """KISS-ICP with a preset for depth cameras."""
 
     max_range: float = Field(4.0, gt=0, description="metres; farther points are not used")
-    voxel: float = Field(0.03, gt=0, description="metres; voxel size of the local map")
-    initial_threshold: float = Field(0.1, gt=0, description="metres; first association threshold")
-    min_motion: float = Field(0.01, gt=0, description="metres; smaller deviations do not adapt the threshold")
+    voxel: float = Field(0.05, gt=0, description="metres; voxel size of the local map")
+    threshold: float = Field(0.02, gt=0, description="metres; points are associated up to three times that")
     stride: int = Field(4, gt=0, description="every n-th pixel in both directions is used")
     min_points: int = Field(500, gt=10, description="points that a scan must have")
     max_surprise: float = Field(0.3, gt=0, description="metres between prediction and result that mean failure")
