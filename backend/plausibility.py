@@ -103,10 +103,12 @@ def _ambiguous(chain: OdometryChain, loops: Sequence[Edge], distances: FloatArra
         shared = (a == g) & (b == h)
         if np.median(off[shared]) <= (limit if shared.sum() > 1 else ALONE * limit):
             continue
-        for mine, other in ((g, h), (h, g)):
-            if not _outweighs(size[mine], typical[mine], size[other], typical[other]):
-                withheld[group == mine] = True
-        withheld |= _third_side(loops, first[shared], second[shared])
+        stands = [_outweighs(size[m], typical[m], size[o], typical[o]) for m, o in ((g, h), (h, g))]
+        for mine, its in zip((g, h), stands, strict=True):
+            withheld[group == mine] |= not its
+        # A loop or two that lose say nothing of other places: they may be wrong about anything.
+        if not (any(stands) and min(size[g], size[h]) < CLEARLY):
+            withheld |= _third_side(loops, first[shared], second[shared])
     return withheld
 
 

@@ -70,7 +70,10 @@ WORST_RATIO, LEAST_KEPT = 1.2, 0.9
 
 
 def run_stress(arguments: argparse.Namespace) -> None:
-    """ATE in cm over the seeds' mean; "holds": ATE within 1.2 times the clean one, 90 % of true loops, no false one."""
+    """ATE in cm over the seeds' mean, then the worst of all attacks at 30 % and at 50 %.
+
+    "Holds at 30 %": ATE within 1.2 times the clean one, 90 % of the true loops accepted, no false one.
+    """
     cases = [(kind, share) for kind in FalseLoopKind for share in SHARES]
     attacks = [Attack(share, kind, seed) for kind, share in cases for seed in range(arguments.seeds)]
 
@@ -80,19 +83,18 @@ def run_stress(arguments: argparse.Namespace) -> None:
             for index, name in enumerate(arguments.strategies):
                 yield [run.name, name, *summary(found[index :: len(arguments.strategies)], arguments.seeds)]
 
-    head = ["run", "strategy", "clean, cm", *(f"{kind} {share:.0%}, cm" for kind, share in cases), "worst ratio"]
-    print_table([*head, "least true kept", "most false kept", "holds"], rows())
+    head = ["run", "strategy", "clean, cm", *(f"{kind} {share:.0%}, cm" for kind, share in cases)]
+    print_table([*head, "worst ratio", "least true kept", "most false kept", "holds at 30 %"], rows())
 
 
 def summary(rows: Sequence[StressRow], seeds: int) -> list[str]:
     """One strategy's figures over all attacks, which follow one another case by case."""
-    stressed = np.array([row.ate_m for row in rows])
-    means = 100 * stressed.reshape(-1, seeds).mean(1)
-    worst = float((stressed / rows[0].ate_clean_m).max())
-    true_kept, false_kept = min(row.true_kept for row in rows), max(row.false_kept for row in rows)
-    holds = worst <= WORST_RATIO and true_kept >= LEAST_KEPT and false_kept == 0
-    figures = [f"{100 * rows[0].ate_clean_m:.2f}", *(f"{mean:.2f}" for mean in means), f"{worst:.2f}"]
-    return [*figures, f"{true_kept:.0%}", f"{false_kept:.0%}", "yes" if holds else "no"]
+    by_case = np.array([(row.ate_m, row.true_kept, row.false_kept) for row in rows]).reshape(-1, len(SHARES), seeds, 3)
+    clean, means = rows[0].ate_clean_m, by_case[..., 0].mean(2).ravel()
+    ratios, kept, wrong = by_case[..., 0].max((0, 2)) / clean, by_case[..., 1].min((0, 2)), by_case[..., 2].max((0, 2))
+    holds = ratios[0] <= WORST_RATIO and kept[0] >= LEAST_KEPT and wrong[0] == 0
+    worst = [", ".join(f"{ratio:.2f}" for ratio in ratios), *(f"{a:.0%}, {b:.0%}" for a, b in (kept, wrong))]
+    return [f"{100 * value:.2f}" for value in (clean, *means)] + [*worst, "yes" if holds else "no"]
 
 
 def run_rings(arguments: argparse.Namespace) -> None:

@@ -122,6 +122,18 @@ def test_one_false_loop_does_not_bring_down_many():
     assert found.reasons == (*(None,) * 15, "ambiguous")
 
 
+def test_one_false_loop_says_nothing_of_other_places():
+    """It puts a view of the corridor into the room; loops between the corridor and the room's first visit stand."""
+    rng = np.random.default_rng(5)
+    true, _ = loops_of(rng)
+    others = measure(TRUTH, list(zip(range(10), range(15, 25), strict=True)), rng)
+    moved = TRUTH.copy()
+    moved[20, :3, 3] += APART
+    false = measure(moved, [(20, 55)], rng)
+    found = screen_loops(drifting_chain(rng), [*true, *others, *false], 4.7, 1.5)
+    assert found.reasons == (*(None,) * 25, "ambiguous")
+
+
 def test_no_loops_and_maps_apart_are_no_error():
     chain = OdometryChain(range(4), [])
     assert screen_loops(chain, [], 4.7, 1.5).reasons == ()
