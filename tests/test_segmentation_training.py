@@ -223,6 +223,15 @@ def test_networks_of_different_widths_have_no_mean(rooms, tmp_path):
         average(rooms, [SHIPPED, tmp_path / "narrow.pt"], settings(), tmp_path / "mean")
 
 
+def test_wider_networks_are_narrowed_before_the_mean(rooms, tmp_path):
+    narrow = settings(decoder_channels=32)
+    one = average(rooms, [SHIPPED], narrow, tmp_path / "one")
+    again = average(rooms, [one, SHIPPED], narrow, tmp_path / "again")
+    first, second = read_tensors(one), read_tensors(again)
+    assert first["classifier.weight"].shape == (40, 32, 1, 1)
+    assert all(torch.allclose(first[name], second[name], rtol=1e-2, atol=1e-3) for name in first)
+
+
 def test_trainings_from_one_start_keep_the_same_channels(rooms, tmp_path):
     """Whatever the seed, or their networks would have no mean."""
     first, second = (
