@@ -106,7 +106,7 @@ def _ambiguous(chain: OdometryChain, loops: Sequence[Edge], distances: FloatArra
         stands = [_outweighs(size[m], typical[m], size[o], typical[o]) for m, o in ((g, h), (h, g))]
         for mine, its in zip((g, h), stands, strict=True):
             withheld[group == mine] |= not its
-        # A loop or two that lose say nothing of other places: they may be wrong about anything.
+        # Where one side stands, a contradiction that rests on a loop or two says nothing of other places.
         if not (any(stands) and min(size[g], size[h]) < CLEARLY):
             withheld |= _third_side(loops, first[shared], second[shared])
     return withheld

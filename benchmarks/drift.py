@@ -40,7 +40,7 @@ from semslam import plugins
 from semslam.config import Config
 from semslam.datasets import Dataset, open_dataset
 from semslam.datasets.selection import Selection
-from semslam.geometry import adjoint, invert, log_so3
+from semslam.geometry import adjoint, invert, tangent
 from semslam.metrics import Metrics
 from semslam.pipeline import replay, run
 from semslam.recording import Recording, read_recording, write_recording
@@ -252,9 +252,8 @@ def normalised_errors(recording: Recording, dataset: Dataset) -> FloatArray:
             carry = adjoint(invert(motion.T_prev_cur))
             covariance = carry @ covariance @ carry.T + motion.covariance
             T = T @ motion.T_prev_cur
-        error = invert(T) @ invert(truth[first]) @ truth[last]
-        tangent = np.concatenate([log_so3(error[:3, :3]), error[:3, 3]])
-        errors.append(float(tangent @ np.linalg.solve(covariance, tangent)) / 6)
+        error = tangent(invert(T) @ invert(truth[first]) @ truth[last])
+        errors.append(float(error @ np.linalg.solve(covariance, error)) / 6)
     return np.array(errors)
 
 

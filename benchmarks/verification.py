@@ -29,7 +29,7 @@ from semslam import plugins
 from semslam.config import Config
 from semslam.datasets import open_dataset
 from semslam.features import FeatureExtractor
-from semslam.geometry import FloatArray, invert, log_so3, rotation_angle
+from semslam.geometry import FloatArray, invert, rotation_angle, tangent
 from semslam.types import Keyframe, KeyframeView, LoopConstraint
 
 PAUSE = 1000.0
@@ -95,8 +95,8 @@ def report(part: Part) -> None:
     for loop in here:
         query, match = loop.candidate.query - part.first, loop.candidate.match - part.first
         E = error_of(part, loop)
-        tangent = np.r_[log_so3(E[:3, :3]), E[:3, 3]]
-        squared.append(float(tangent @ np.linalg.solve(loop.covariance, tangent)))
+        error = tangent(E)
+        squared.append(float(error @ np.linalg.solve(loop.covariance, error)))
         errors.append((float(np.linalg.norm(E[:3, 3])), float(np.degrees(rotation_angle(E)))))
         if errors[-1][0] <= POSE_TOLERANCE and errors[-1][1] <= ANGLE_TOLERANCE:
             good.add(query)

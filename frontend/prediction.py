@@ -5,7 +5,7 @@ from collections import deque
 import numpy as np
 
 from semslam.errors import DatasetError
-from semslam.geometry import exp_so3, log_so3, make_transform
+from semslam.geometry import exp_so3, make_transform, tangent
 from semslam.types import FloatArray, Frame, Motion, TrackingStatus
 
 COAST_SECONDS = 0.3
@@ -73,11 +73,6 @@ class RecentVelocity:
         before = [known for _, known in self._velocities]
         self._velocities.append((timestamp, velocity))
         return (velocity - np.mean(before, axis=0)) * elapsed if before else np.zeros(6)
-
-
-def tangent(T: FloatArray) -> FloatArray:
-    """A small motion (4, 4) as rotation vector and translation (6,)."""
-    return np.concatenate([log_so3(T[:3, :3]), T[:3, 3]])
 
 
 def wide_covariance(seconds: float) -> FloatArray:

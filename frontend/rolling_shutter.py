@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from frontend.prediction import tangent
+from semslam.geometry import tangent
 from semslam.reprojection import Measurements, pose_jacobians, project_stereo
 from semslam.types import Features, FloatArray, Intrinsics
 

@@ -69,6 +69,11 @@ def log_so3(R: FloatArray) -> FloatArray:
     return np.asarray(factor * q[:3])
 
 
+def tangent(T: FloatArray) -> FloatArray:
+    """Rotation vector and translation (6,) of a small motion (4, 4), in radians and metres."""
+    return np.concatenate([log_so3(T[:3, :3]), T[:3, 3]])
+
+
 def orthonormalise(T: FloatArray) -> FloatArray:
     """Project the rotations of transforms (..., 4, 4) onto SO(3); removes the drift of long products."""
     U, _, Vt = np.linalg.svd(T[..., :3, :3])
