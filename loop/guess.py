@@ -51,7 +51,7 @@ class FeaturePair:
 
     def __init__(self, query: Keyframe, match: Keyframe, threshold: float) -> None:
         self._camera = query.intrinsics
-        ours, theirs = query.details or query.features, match.details or match.features
+        ours, theirs = query.finest, match.finest
         self._pixels = ours.pixels.astype(np.float64)
         self._deep = np.flatnonzero(theirs.depths > 0)
         self._points = theirs.points[self._deep].astype(np.float64)
@@ -68,6 +68,10 @@ class FeaturePair:
     def solve(self, pairs: IntArray, seed: int) -> PnpResult | None:
         """The pose that most of the pairs agree on."""
         return solve_pnp(self._points[pairs[:, 1]], self._pixels[pairs[:, 0]], self._camera, self._threshold, seed)
+
+    def rows(self, matches: IntArray) -> IntArray:
+        """Rows (K, 2) of the query's and of the match's ``Keyframe.finest`` for pairs (K, 2)."""
+        return np.column_stack([matches[:, 0], self._deep[matches[:, 1]]])
 
     def support(self, T_match_query: FloatArray, source: str) -> Guess | None:
         """Look for matches where a pose predicts them, and refine it on those; None where too few agree."""

@@ -73,8 +73,9 @@ class IcpVerifier:
         covariance = self._covariance(query, match, guess, T_match_query, fit, method, overlap)
         refusal = self._gate(query, match, candidate, T_match_query, fit, overlap, covariance)
         return refusal or LoopConstraint(
-            candidate, T_match_query, covariance, fit.fitness, fit.rmse, overlap, found, method, figures
-        )
+            candidate, T_match_query, covariance, fit.fitness, fit.rmse, overlap, found, method, figures,
+            shared=pair.rows(guess.matches),
+        )  # fmt: skip
 
     def _best_guess(
         self, query: Keyframe, match: Keyframe, candidate: LoopCandidate, pair: FeaturePair, matches: IntArray

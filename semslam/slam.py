@@ -6,10 +6,8 @@ from typing import Self
 
 import numpy as np
 
-from backend.bundle import adjust
 from backend.covisibility import Covisibility
 from backend.pose_graph import GraphSolution, PoseGraph
-from backend.repetition import discounted
 from frontend.keyframes import KeyframePolicy, make_keyframe
 from frontend.odometry import Odometry
 from loop.detector import LoopDetector, NoLoops
@@ -22,6 +20,7 @@ from semslam.config import Config
 from semslam.features import FeatureExtractor
 from semslam.geometry import adjoint, invert, orthonormalise
 from semslam.recovery import recover_poses
+from semslam.refinement import refine
 from semslam.stopwatch import Stopwatch
 from semslam.types import (
     FloatArray,
@@ -219,9 +218,8 @@ class Slam:
         """
         with self._stopwatch.stage("optimize"):
             solution = self._graph.optimize()
-        if self._observations:
-            with self._stopwatch.stage("bundle"):
-                solution = self._adjusted(solution)
+        with self._stopwatch.stage("bundle"):
+            solution = refine(solution, self._keyframes, self._observations, self._config)
         components = self._components(solution)
         unplaced = len(solution.components)
         return SlamResult(
@@ -296,13 +294,6 @@ class Slam:
         self._follower.note(outcome)
         if isinstance(outcome, LoopConstraint):
             self._graph.add_loop(outcome)
-
-    def _adjusted(self, solution: GraphSolution) -> GraphSolution:
-        """The solution with its poses after bundle adjustment of the landmarks that the odometry keeps."""
-        intrinsics = self._keyframes[0].intrinsics
-        edges = (*solution.odometry, *discounted(solution.loops), *solution.covisible)
-        result = adjust(solution.poses, self._observations, intrinsics, self._config.backend.bundle, edges)
-        return replace(solution, poses=result.poses)
 
     def _components(self, solution: GraphSolution) -> dict[int, int]:
         """For each map of the odometry the place of its component in ``solution.components``, the largest first."""

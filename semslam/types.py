@@ -189,6 +189,11 @@ class Keyframe:
     cloud: Cloud
     details: Features | None = None
 
+    @property
+    def finest(self) -> Features:
+        """The most keypoints there are."""
+        return self.details or self.features
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class KeyframeView:
@@ -270,6 +275,7 @@ class LoopConstraint:
         inliers: feature matches that support the pose.
         method: which estimate was kept, such as "pnp" or "icp".
         figures: what the steps on the way measured, by name.
+        shared: (K, 2) int64 rows of the query's and of the match's ``finest`` features that agree, or None.
     """
 
     candidate: LoopCandidate
@@ -281,6 +287,7 @@ class LoopConstraint:
     inliers: int
     method: str
     figures: dict[str, float] = field(default_factory=dict)
+    shared: IntArray | None = None
 
 
 class RejectionReason(StrEnum):

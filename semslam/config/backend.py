@@ -18,6 +18,9 @@ class BundleConfig(Section):
     disparity_weight: float = Field(0.5, gt=0, description="weight of depth, as a virtual disparity, against a pixel")
     baseline: float = Field(0.08, gt=0, description="metres between the virtual stereo pair's cameras")
     outlier: float = Field(2.8, gt=0, description="whitened reprojection error at which an observation is dropped")
+    closures: bool = Field(
+        True, description="where odometry keeps no landmarks, adjust by the features that closures share"
+    )
     min_views: int = Field(
         3, gt=1, description="keyframes that must see a landmark; of two neighbours odometry says the same"
     )
