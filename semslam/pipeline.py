@@ -161,7 +161,7 @@ class _Session:
                 self._interrupted,
                 self._checksum,
             ),
-            notes=(*self._dataset.notes, *self._unreadable),
+            notes=(*self._dataset.notes, *self._unreadable, *slam.notes),
         )
 
 

@@ -17,6 +17,7 @@ from loop.segmentation.segmenter import Segmenter
 from loop.verification import IcpVerifier, LoopVerifier
 from semslam import plugins
 from semslam.config import Config
+from semslam.errors import GraphError
 from semslam.features import FeatureExtractor
 from semslam.geometry import adjoint, invert, orthonormalise
 from semslam.recovery import recover_poses
@@ -77,6 +78,7 @@ class SlamResult:
         solution: optimised keyframe poses and a verdict for each verified loop.
         poses: (N, 4, 4) optimised T_world_cam of every frame.
         components: for each frame the map it ends in, 0 the largest; maps that a loop joined share a number.
+        notes: what could not be done, a sentence each.
     """
 
     frames: tuple[FrameState, ...]
@@ -85,6 +87,7 @@ class SlamResult:
     solution: GraphSolution
     poses: FloatArray
     components: tuple[int, ...]
+    notes: tuple[str, ...] = ()
 
     @property
     def candidates(self) -> tuple[LoopCandidate, ...]:
@@ -218,8 +221,12 @@ class Slam:
         """
         with self._stopwatch.stage("optimize"):
             solution = self._graph.optimize()
+        notes = []
         with self._stopwatch.stage("bundle"):
-            solution = refine(solution, self._keyframes, self._observations, self._config)
+            try:
+                solution = refine(solution, self._keyframes, self._observations, self._config)
+            except GraphError as error:
+                notes.append(f"{error} The poses are those of the pose graph.")
         components = self._components(solution)
         unplaced = len(solution.components)
         return SlamResult(
@@ -235,6 +242,7 @@ class Slam:
                 solution.poses,
             ),
             components=tuple(components.get(state.map_id, unplaced) for state in self._frames),
+            notes=tuple(notes),
         )
 
     def _add_keyframe(self, frame: Frame, motion: Motion) -> Keyframe:

@@ -192,7 +192,7 @@ class Keyframe:
     @property
     def finest(self) -> Features:
         """The most keypoints there are."""
-        return self.details or self.features
+        return self.features if self.details is None else self.details
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from backend.pose_graph import PoseGraph
+from backend.pose_graph import GraphSolution, PoseGraph
 from semslam.camera import Intrinsics
 from semslam.config import Config
 from semslam.errors import GraphError
@@ -149,6 +149,19 @@ def test_finishing_before_a_frame_is_an_error_and_not_a_result() -> None:
     )
     with pytest.raises(GraphError):
         slam.finish()
+
+
+def test_an_adjustment_that_fails_leaves_the_pose_graphs_poses(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: object) -> GraphSolution:
+        raise GraphError("The bundle could not be adjusted: the system is indeterminate.")
+
+    _, kept = run_ring()
+    monkeypatch.setattr("semslam.slam.refine", fail)
+    _, result = run_ring()
+    np.testing.assert_allclose(result.poses, kept.poses, atol=1e-9)
+    assert len(result.notes) == 1
+    assert "indeterminate" in result.notes[0]
+    assert kept.notes == ()
 
 
 def make_light_keyframe(id: int, timestamp: float, T: FloatArray) -> Keyframe:
