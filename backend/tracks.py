@@ -33,10 +33,10 @@ def join_tracks(features: Mapping[int, Features], pairs: Sequence[MatchedFeature
         features: of each keyframe, by key.
         pairs: matches between them.
     """
-    keys = sorted(features)
-    first_row = dict(zip(keys, np.cumsum([0, *(len(features[key]) for key in keys)]).tolist(), strict=False))
     if not pairs:
         return {}
+    keys = sorted(features)
+    first_row = dict(zip(keys, np.cumsum([0, *(len(features[key]) for key in keys)]).tolist(), strict=False))
     links = np.concatenate([pair.rows + np.array([first_row[pair.first], first_row[pair.second]]) for pair in pairs])
     rows = np.unique(links)
     owners = np.searchsorted(list(first_row.values()), rows, side="right") - 1
@@ -45,9 +45,11 @@ def join_tracks(features: Mapping[int, Features], pairs: Sequence[MatchedFeature
         track[np.searchsorted(rows, chain)] = number
     places, counts = np.unique(np.column_stack([track, owners]), axis=0, return_counts=True)
     sound = ~np.isin(track, places[counts > 1, 0])
+    rows, owners, track = rows[sound], owners[sound], track[sound]
+    ends = np.searchsorted(owners, np.arange(len(keys) + 1))
     seen = {}
     for place, key in enumerate(keys):
-        chosen = sound & (owners == place)
-        own = rows[chosen] - first_row[key]
-        seen[key] = Observations(track[chosen], features[key].pixels[own], features[key].depths[own])
+        inside = slice(ends[place], ends[place + 1])
+        own = rows[inside] - first_row[key]
+        seen[key] = Observations(track[inside], features[key].pixels[own], features[key].depths[own])
     return seen

@@ -5,7 +5,7 @@ from dataclasses import replace
 from itertools import pairwise
 
 from backend.bundle import adjust
-from backend.pose_graph import GraphSolution
+from backend.pose_graph import Edge, GraphSolution
 from backend.repetition import discounted
 from backend.tracks import MatchedFeatures, join_tracks
 from loop.neighbours import shared_features
@@ -35,13 +35,15 @@ def refine(
         GraphError: the optimiser failed.
     """
     settings = config.backend.bundle
-    # A map that keeps landmarks has tied old keyframes to new ones already, and each loop says much of the same.
-    loops = discounted(solution.loops) if observations else solution.loops
-    if not observations:
-        if not (settings.rounds and settings.closures and loops):
-            return solution
+    loops: Sequence[Edge] = solution.loops
+    if observations:
+        # A map that keeps landmarks has tied old keyframes to new ones already, and each loop says much of the same.
+        loops = discounted(loops)
+    elif settings.rounds and settings.closures and loops:
         observations = _shared(solution, keyframes, config)
         settings = settings.model_copy(update=SEEN_TWICE)
+    else:
+        return solution
     edges = (*solution.odometry, *loops, *solution.covisible)
     result = adjust(solution.poses, observations, keyframes[0].intrinsics, settings, edges)
     return replace(solution, poses=result.poses)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from semslam.config import Config
-from semslam.errors import DatasetError, ResultsError
+from semslam.errors import DatasetError, GraphError, ResultsError
 from semslam.ledger import LedgerEntry, Verdict
 from semslam.pipeline import run
 from semslam.results import new_run_directory, read_ledger, read_run, write_ledger, write_run
@@ -36,6 +36,16 @@ def test_unreadable_frames_are_counted_and_named(wall: WallDataset) -> None:
     result = run(replace(wall, unreadable=(3, 7)), ALONE)
     assert (result.metrics.frames, result.metrics.unreadable, result.metrics.tracked) == (12, 2, 10)
     assert any("000003.png is truncated" in note for note in result.notes)
+
+
+def test_an_adjustment_that_failed_is_told(wall: WallDataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: object) -> None:
+        raise GraphError("The bundle could not be adjusted: the system is indeterminate.")
+
+    monkeypatch.setattr("semslam.slam.refine", fail)
+    write_run(run(wall, ALONE), wall, tmp_path / "run", plots=False)
+    assert "could not be adjusted" in (tmp_path / "run" / "log.txt").read_text()
+    assert len(read_run(tmp_path / "run").trajectory) == len(wall)
 
 
 def test_a_sequence_without_one_readable_frame_is_an_error(wall: WallDataset) -> None:
