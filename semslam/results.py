@@ -93,7 +93,7 @@ def write_run(
             write_trajectory(work / "groundtruth.txt", result.ground_truth)
         write_ledger(work / "loops.jsonl", result.ledger)
         write_g2o(work / "graph.g2o", result.slam.solution)
-        write_map(work / "map.ply", result.slam)
+        write_map(work / "map.ply", result.slam.largest_map, result.slam.solution.poses)
         write_recording(work, result.recording, source)
         if plots:
             present(result, dataset, work)

@@ -90,6 +90,12 @@ class SlamResult:
     notes: tuple[str, ...] = ()
 
     @property
+    def largest_map(self) -> tuple[Keyframe, ...]:
+        """Keyframes of the largest connected component."""
+        inside = set(self.solution.components[0])
+        return tuple(keyframe for keyframe in self.keyframes if keyframe.id in inside)
+
+    @property
     def candidates(self) -> tuple[LoopCandidate, ...]:
         """What the detector proposed, in the order of ``outcomes``."""
         return tuple(outcome.candidate for outcome in self.outcomes)
