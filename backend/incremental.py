@@ -3,9 +3,16 @@
 import gtsam
 import numpy.typing as npt
 
-from backend.factors import ANCHOR_SIGMA, FLOATING_SIGMA, between_factor, make_values, prior_factor, read_poses
-from backend.pose_graph import PoseGraph
-from backend.products import GraphSolution, loop_edge
+from semslam.backend.graph.factors import (
+    ANCHOR_SIGMA,
+    FLOATING_SIGMA,
+    between_factor,
+    make_values,
+    prior_factor,
+    read_poses,
+)
+from semslam.backend.graph.products import GraphSolution, loop_edge
+from semslam.backend.pose_graph import PoseGraph
 from semslam.config import BackendConfig
 from semslam.errors import GraphError
 from semslam.types import FloatArray, LoopConstraint

@@ -6,10 +6,9 @@ from dataclasses import dataclass
 import gtsam
 import numpy as np
 
-from backend.calibration import cycle_scale, loop_scale, odometry_scale
-from backend.chain import OdometryChain
-from backend.components import connected_components, place_components
-from backend.factors import (
+from semslam.backend.graph.chain import OdometryChain
+from semslam.backend.graph.components import connected_components, place_components
+from semslam.backend.graph.factors import (
     ANCHOR_SIGMA,
     FLOATING_SIGMA,
     between_factor,
@@ -18,11 +17,12 @@ from backend.factors import (
     prior_factor,
     read_poses,
 )
-from backend.plausibility import Screening, screen_loops
-from backend.products import Edge, GraphSolution, LoopVerdict, loop_edge
-from backend.robust import RobustProblem, RobustSolution, solve_robustly
+from semslam.backend.graph.products import Edge, GraphSolution, LoopVerdict, loop_edge
+from semslam.backend.robust.calibration import cycle_scale, loop_scale, odometry_scale
+from semslam.backend.robust.plausibility import Screening, screen_loops
+from semslam.backend.robust.strategies import RobustProblem, RobustSolution, solve_robustly
 from semslam.config import BackendConfig
-from semslam.geometry import invert
+from semslam.geometry.se3 import invert
 from semslam.types import FloatArray, LoopConstraint, RejectionReason
 
 SLACK = 2.25

@@ -2,9 +2,9 @@
 
 import numpy.typing as npt
 
-from backend.checks import checked_covariance, checked_pose
-from backend.optimization import GraphProblem, optimize_graph
-from backend.products import Edge, GraphSolution, LoopVerdict, PosedGraph, loop_edge
+from semslam.backend.graph.checks import checked_covariance, checked_pose
+from semslam.backend.graph.products import Edge, GraphSolution, LoopVerdict, PosedGraph, loop_edge
+from semslam.backend.optimization import GraphProblem, optimize_graph
 from semslam.config import BackendConfig
 from semslam.errors import GraphError
 from semslam.types import FloatArray, LoopConstraint

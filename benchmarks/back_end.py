@@ -21,21 +21,21 @@ from typing import Any
 import gtsam
 import numpy as np
 
-from backend.bundle import adjust
-from backend.factors import mahalanobis
-from backend.g2o import read_g2o
-from backend.incremental import IncrementalPoseGraph
-from backend.judge import constraint_of, judge_graph, split_edges
-from backend.pose_graph import PoseGraph
-from backend.products import Edge, PosedGraph
-from backend.robust import STRATEGIES
-from backend.simulation import measure, measure_odometry, noisy, ring
-from backend.stress import Attack, FalseLoopKind, false_loops, stress
-from semslam.camera import Intrinsics
+from semslam.backend.analysis.judge import constraint_of, judge_graph, split_edges
+from semslam.backend.analysis.simulation import measure, measure_odometry, noisy, ring
+from semslam.backend.analysis.stress import Attack, FalseLoopKind, false_loops, stress
+from semslam.backend.bundle.bundle import adjust
+from semslam.backend.graph.factors import mahalanobis
+from semslam.backend.graph.g2o import read_g2o
+from semslam.backend.graph.products import Edge, PosedGraph
+from semslam.backend.incremental import IncrementalPoseGraph
+from semslam.backend.pose_graph import PoseGraph
+from semslam.backend.robust.strategies import STRATEGIES
 from semslam.config import BackendConfig, BundleConfig
 from semslam.errors import SemslamError
-from semslam.geometry import FloatArray, compose, make_transform
-from semslam.stress_test import StressRow, stress_run
+from semslam.geometry.camera import Intrinsics
+from semslam.geometry.se3 import FloatArray, compose, make_transform
+from semslam.studies.false_loops import StressRow, stress_run
 from semslam.types import Observations
 
 SMALL = np.array([0.002] * 3 + [0.004] * 3)

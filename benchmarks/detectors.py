@@ -22,21 +22,21 @@ from time import process_time
 
 import numpy as np
 
-from eval.changes import Change, change_frame
-from eval.loop_truth import TRUE_OVERLAP, find_loop_truth, make_view
-from eval.reliability import calibration_error
-from eval.trajectory import BoolArray, poses_at
-from frontend.keyframes import make_keyframe
-from loop.detector import LoopDetector
-from loop.segmentation.build import build_segmenter
-from loop.verification import IcpVerifier
 from semslam import plugins
 from semslam.config import Config
 from semslam.datasets import open_dataset
 from semslam.datasets.dataset import Dataset
-from semslam.experiments import compare_detectors, exhaustive_detector, keyframe_views
+from semslam.eval.loops.reliability import calibration_error
+from semslam.eval.loops.truth import TRUE_OVERLAP, find_loop_truth, make_view
+from semslam.eval.pairs.changes import Change, change_frame
+from semslam.eval.trajectory import BoolArray, poses_at
 from semslam.features import FeatureExtractor
-from semslam.geometry import invert, rotation_angle
+from semslam.frontend.keyframes import make_keyframe
+from semslam.geometry.se3 import invert, rotation_angle
+from semslam.loop.detector import LoopDetector
+from semslam.loop.segmentation.build import build_segmenter
+from semslam.loop.verification.verification import IcpVerifier
+from semslam.studies.detectors import compare_detectors, exhaustive_detector, keyframe_views
 from semslam.types import FloatArray, Frame, KeyframeView, LoopConstraint
 
 NAMES = "fused,semantic,semantic-paper,dbow,sda,cnnw,conv3,thumbnail,hog,gist"

@@ -34,17 +34,17 @@ from typing import TypeVar
 
 import numpy as np
 
-from eval.trajectory import poses_at
-from loop.verification import IcpVerifier
 from semslam import plugins
 from semslam.config import Config
 from semslam.datasets import Dataset, open_dataset
 from semslam.datasets.selection import Selection
-from semslam.geometry import adjoint, invert, tangent
-from semslam.metrics import Metrics
-from semslam.pipeline import replay, run
-from semslam.recording import Recording, read_recording, write_recording
-from semslam.results import write_run
+from semslam.eval.trajectory import poses_at
+from semslam.geometry.se3 import adjoint, invert, tangent
+from semslam.loop.verification.verification import IcpVerifier
+from semslam.runs.metrics import Metrics
+from semslam.runs.pipeline import replay, run
+from semslam.runs.recording import Recording, read_recording, write_recording
+from semslam.runs.results import write_run
 from semslam.types import FloatArray, Frame, Keyframe, LoopCandidate, LoopConstraint, LoopRejection, TrackingStatus
 
 ROWS = "rows.csv"

@@ -21,17 +21,17 @@ from pathlib import Path
 
 import numpy as np
 
-from backend.pose_graph import PoseGraph
-from eval.trajectory import score_trajectory
-from frontend.odometry import Odometry
-from loop.verification import IcpVerifier
 from semslam import plugins
+from semslam.backend.pose_graph import PoseGraph
 from semslam.config import Config, DatasetConfig, FaultConfig
 from semslam.datasets import Dataset, open_dataset
 from semslam.datasets.tum_format import read_trajectory
-from semslam.pipeline import run
-from semslam.slam import Slam
-from semslam.stopwatch import Stopwatch
+from semslam.eval.trajectory import score_trajectory
+from semslam.frontend.odometry import Odometry
+from semslam.loop.verification.verification import IcpVerifier
+from semslam.runs.pipeline import run
+from semslam.runtime.stopwatch import Stopwatch
+from semslam.system.slam import Slam
 from semslam.types import Frame, Motion, TrackingStatus, Trajectory
 
 PEER_RUNS = 3

@@ -17,22 +17,22 @@ import cv2
 import numpy as np
 import torch
 
-from loop.segmentation.build import build_segmenter
-from loop.segmentation.checkpoint import SHIPPED, load_network
-from loop.segmentation.classes import CLASS_COUNT, GROUP_OF_LABEL
-from loop.segmentation.decoding import shrink
-from loop.segmentation.evaluation import confusion_matrix, evaluate, score
-from loop.segmentation.export import float_graph
-from loop.segmentation.network import build_mobilenet_deeplab, count_multiply_adds, count_parameters
-from loop.segmentation.onnx import OnnxSegmenter, load_graph
-from loop.segmentation.photos import UInt8Array, list_names, read_photo
-from loop.segmentation.segmenter import Segmenter
-from loop.segmentation.self_training import Teacher
-from loop.segmentation.xception import build_xception_deeplab
 from semslam.config import load_config
 from semslam.datasets import open_dataset
 from semslam.datasets.dataset import Dataset
-from semslam.geometry import invert, transform_points
+from semslam.geometry.se3 import invert, transform_points
+from semslam.loop.segmentation.build import build_segmenter
+from semslam.loop.segmentation.classes import CLASS_COUNT, GROUP_OF_LABEL
+from semslam.loop.segmentation.decoding import shrink
+from semslam.loop.segmentation.network.checkpoint import SHIPPED, load_network
+from semslam.loop.segmentation.network.export import float_graph
+from semslam.loop.segmentation.network.network import build_mobilenet_deeplab, count_multiply_adds, count_parameters
+from semslam.loop.segmentation.network.xception import build_xception_deeplab
+from semslam.loop.segmentation.photos import UInt8Array, list_names, read_photo
+from semslam.loop.segmentation.segmenter import Segmenter
+from semslam.loop.segmentation.segmenters.onnx import OnnxSegmenter, load_graph
+from semslam.loop.segmentation.training.evaluation import confusion_matrix, evaluate, score
+from semslam.loop.segmentation.training.self_training import Teacher
 from semslam.types import Frame, LabelMap
 
 SIZES = ((320, 240), (448, 336), (640, 480))

@@ -14,17 +14,21 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from loop import autoencoder, cnnw, conv3, fusion, sda, vocabulary
-from loop.backbone import Backbone
-from loop.dbow import make_bag
-from loop.fusion_training import APART, Looks, train_fusion
-from loop.photo_views import make_view, overlap
-from loop.segmentation.classes import MOVABLE, NYU40_NAMES
-from loop.segmentation.onnx import OnnxSegmenter
-from loop.word_index import Bag
-from semslam.camera import Intrinsics
 from semslam.config import Config
 from semslam.features import FeatureExtractor
+from semslam.geometry.camera import Intrinsics
+from semslam.loop.detectors.bag_of_words import vocabulary
+from semslam.loop.detectors.bag_of_words.detector import make_bag
+from semslam.loop.detectors.bag_of_words.word_index import Bag
+from semslam.loop.detectors.common.backbone import Backbone
+from semslam.loop.detectors.fused import fusion
+from semslam.loop.detectors.fused.photo_views import make_view, overlap
+from semslam.loop.detectors.fused.training import APART, Looks, train_fusion
+from semslam.loop.detectors.global_descriptor import cnnw, conv3
+from semslam.loop.detectors.sda import autoencoder
+from semslam.loop.detectors.sda import detector as sda
+from semslam.loop.segmentation.classes import MOVABLE, NYU40_NAMES
+from semslam.loop.segmentation.segmenters.onnx import OnnxSegmenter
 from semslam.types import Features, Float32Array, Frame, UInt8Array
 
 SIZE = (640, 480)

@@ -18,18 +18,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from eval.loop_truth import ANGLE_TOLERANCE, POSE_TOLERANCE, LoopTruth, find_loop_truth, make_view
-from eval.trajectory import poses_at
-from frontend.keyframes import make_keyframe
-from loop.detector import LoopDetector
-from loop.registration import ICP_KINDS
-from loop.segmentation.build import build_segmenter
-from loop.verification import IcpVerifier
 from semslam import plugins
 from semslam.config import Config
 from semslam.datasets import open_dataset
+from semslam.eval.loops.truth import ANGLE_TOLERANCE, POSE_TOLERANCE, LoopTruth, find_loop_truth, make_view
+from semslam.eval.trajectory import poses_at
 from semslam.features import FeatureExtractor
-from semslam.geometry import FloatArray, invert, rotation_angle, tangent
+from semslam.frontend.keyframes import make_keyframe
+from semslam.geometry.se3 import FloatArray, invert, rotation_angle, tangent
+from semslam.loop.detector import LoopDetector
+from semslam.loop.segmentation.build import build_segmenter
+from semslam.loop.verification.registration import ICP_KINDS
+from semslam.loop.verification.verification import IcpVerifier
 from semslam.types import Keyframe, KeyframeView, LoopConstraint
 
 PAUSE = 1000.0

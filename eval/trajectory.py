@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from semslam.errors import TrajectoryError
-from semslam.geometry import FloatArray, invert, quaternions_to_rotations, rotation_angle, rotations_to_quaternions
+from semslam.geometry.se3 import FloatArray, invert, quaternions_to_rotations, rotation_angle, rotations_to_quaternions
 from semslam.types import Trajectory
 
 MAX_DIFFERENCE = 0.02

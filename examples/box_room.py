@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from semslam import Frame, Intrinsics
-from semslam.geometry import FloatArray, exp_so3, make_transform
+from semslam.geometry.se3 import FloatArray, exp_so3, make_transform
 
 CAMERA = Intrinsics(320, 240, 260.0, 260.0, 159.5, 119.5)
 HALF_SIZE = np.array([2.5, 1.4, 2.0])  # metres from the middle to the walls

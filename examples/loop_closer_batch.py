@@ -10,8 +10,8 @@ import numpy as np
 from box_room import CAMERA, frames, poses
 from gtsam.symbol_shorthand import X
 
-from loop.detector import LoopDetector
 from semslam import LoopCloser
+from semslam.loop.detector import LoopDetector
 
 ODOMETRY_NOISE = gtsam.noiseModel.Diagonal.Sigmas([0.02, 0.02, 0.02, 0.03, 0.03, 0.03])
 LOOP_NOISE = gtsam.noiseModel.Diagonal.Sigmas([0.01, 0.01, 0.01, 0.02, 0.02, 0.02])

@@ -2,9 +2,9 @@
 
 from typing import Self
 
-from frontend.bridge import DenseBridge
-from frontend.feature_map import FeatureMapOdometry
 from semslam.config import Config
+from semslam.frontend.feature_map.bridge import DenseBridge
+from semslam.frontend.feature_map.odometry import FeatureMapOdometry
 
 
 class AutoOdometry(FeatureMapOdometry):

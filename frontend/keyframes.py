@@ -3,9 +3,9 @@
 import numpy as np
 import numpy.typing as npt
 
-from semslam.camera import Intrinsics
 from semslam.config import KeyframeConfig
-from semslam.geometry import Float32Array, FloatArray, invert, rotation_angle
+from semslam.geometry.camera import Intrinsics
+from semslam.geometry.se3 import Float32Array, FloatArray, invert, rotation_angle
 from semslam.types import Cloud, Features, Frame, Keyframe, UInt8Array
 
 STAMP_TOLERANCE = 1e-3

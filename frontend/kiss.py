@@ -4,9 +4,9 @@ from typing import Any, Self
 
 import numpy as np
 
-from frontend.prediction import ConstantVelocity, RecentVelocity, check_frame, first_motion
 from semslam.config import Config, KissConfig
-from semslam.geometry import invert, is_rigid, rotation_angle
+from semslam.frontend.prediction import ConstantVelocity, RecentVelocity, check_frame, first_motion
+from semslam.geometry.se3 import invert, is_rigid, rotation_angle
 from semslam.types import FloatArray, Frame, Motion, TrackingStatus
 
 ALONG_SURFACE = 0.03

@@ -5,7 +5,7 @@ from collections import deque
 import numpy as np
 
 from semslam.errors import DatasetError
-from semslam.geometry import exp_so3, make_transform, tangent
+from semslam.geometry.se3 import exp_so3, make_transform, tangent
 from semslam.types import FloatArray, Frame, Motion, TrackingStatus
 
 COAST_SECONDS = 0.3

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from semslam.config import LoopConfig
-from semslam.geometry import invert, transform_points
+from semslam.geometry.se3 import invert, transform_points
 from semslam.types import FloatArray, Keyframe, LoopCandidate, LoopConstraint, LoopEvidence, LoopRejection
 
 GAP_SHARE = 0.5

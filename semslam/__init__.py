@@ -14,14 +14,14 @@ _HOMES = {
     "Dataset": "semslam.datasets.dataset",
     "Frame": "semslam.types",
     "Intrinsics": "semslam.types",
-    "LoopCloser": "semslam.closer",
-    "RunResult": "semslam.pipeline",
+    "LoopCloser": "semslam.system.closer",
+    "RunResult": "semslam.runs.pipeline",
     "SemslamError": "semslam.errors",
-    "Slam": "semslam.slam",
+    "Slam": "semslam.system.slam",
     "Trajectory": "semslam.types",
     "load_config": "semslam.config",
     "open_dataset": "semslam.datasets",
-    "run": "semslam.pipeline",
+    "run": "semslam.runs.pipeline",
 }
 
 

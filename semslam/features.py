@@ -8,10 +8,10 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from semslam.camera import Intrinsics
 from semslam.config import FeatureConfig
-from semslam.geometry import Float32Array, FloatArray, invert, make_transform
-from semslam.reprojection import measure, refine_pose, squared_errors
+from semslam.geometry.camera import Intrinsics
+from semslam.geometry.reprojection import measure, refine_pose, squared_errors
+from semslam.geometry.se3 import Float32Array, FloatArray, invert, make_transform
 from semslam.types import Features, Frame, IntArray, UInt8Array
 
 PATCH = 31

@@ -15,31 +15,31 @@ from typing import Any
 from semslam.errors import ConfigError, SemslamWarning
 
 ODOMETRIES: dict[str, str] = {
-    "feature_map": "frontend.feature_map:FeatureMapOdometry",
-    "feature": "frontend.feature:FeatureOdometry",
-    "dense": "frontend.dense:DenseOdometry",
-    "dense_keyframe": "frontend.dense_keyframe:DenseKeyframeOdometry",
-    "kiss": "frontend.kiss:KissOdometry",
-    "auto": "frontend.auto:AutoOdometry",
+    "feature_map": "semslam.frontend.feature_map.odometry:FeatureMapOdometry",
+    "feature": "semslam.frontend.frame_to_frame.feature:FeatureOdometry",
+    "dense": "semslam.frontend.frame_to_frame.dense:DenseOdometry",
+    "dense_keyframe": "semslam.frontend.frame_to_frame.dense_keyframe:DenseKeyframeOdometry",
+    "kiss": "semslam.frontend.kiss:KissOdometry",
+    "auto": "semslam.frontend.auto:AutoOdometry",
 }
 DETECTORS: dict[str, str] = {
-    "none": "loop.detector:NoLoops",
-    "semantic": "loop.semantic:SemanticDetector",
-    "semantic-paper": "loop.semantic:PaperSemanticDetector",
-    "fused": "loop.fused:FusedDetector",
-    "dbow": "loop.dbow:DbowDetector",
-    "sda": "loop.sda:SdaDetector",
-    "cnnw": "loop.cnnw:CnnwDetector",
-    "conv3": "loop.conv3:Conv3Detector",
-    "thumbnail": "loop.thumbnail:ThumbnailDetector",
-    "hog": "loop.hog:HogDetector",
-    "gist": "loop.gist:GistDetector",
+    "none": "semslam.loop.detector:NoLoops",
+    "semantic": "semslam.loop.detectors.semantic.detector:SemanticDetector",
+    "semantic-paper": "semslam.loop.detectors.semantic.detector:PaperSemanticDetector",
+    "fused": "semslam.loop.detectors.fused.detector:FusedDetector",
+    "dbow": "semslam.loop.detectors.bag_of_words.detector:DbowDetector",
+    "sda": "semslam.loop.detectors.sda.detector:SdaDetector",
+    "cnnw": "semslam.loop.detectors.global_descriptor.cnnw:CnnwDetector",
+    "conv3": "semslam.loop.detectors.global_descriptor.conv3:Conv3Detector",
+    "thumbnail": "semslam.loop.detectors.global_descriptor.thumbnail:ThumbnailDetector",
+    "hog": "semslam.loop.detectors.global_descriptor.hog:HogDetector",
+    "gist": "semslam.loop.detectors.global_descriptor.gist:GistDetector",
 }
 SEGMENTERS: dict[str, str] = {
-    "onnx": "loop.segmentation.onnx:OnnxSegmenter",
-    "torch": "loop.segmentation.torch:TorchSegmenter",
-    "folder": "loop.segmentation.folder:FolderSegmenter",
-    "constant": "loop.segmentation.constant:ConstantSegmenter",
+    "onnx": "semslam.loop.segmentation.segmenters.onnx:OnnxSegmenter",
+    "torch": "semslam.loop.segmentation.segmenters.torch:TorchSegmenter",
+    "folder": "semslam.loop.segmentation.segmenters.folder:FolderSegmenter",
+    "constant": "semslam.loop.segmentation.segmenters.constant:ConstantSegmenter",
 }
 DATASETS: dict[str, str] = {
     "tum": "semslam.datasets.tum:TumDataset",

@@ -10,9 +10,9 @@ from enum import StrEnum
 import numpy as np
 import numpy.typing as npt
 
-from semslam.camera import Intrinsics
 from semslam.errors import TrajectoryError
-from semslam.geometry import Float32Array, FloatArray, is_rigid
+from semslam.geometry.camera import Intrinsics
+from semslam.geometry.se3 import Float32Array, FloatArray, is_rigid
 
 __all__ = [
     "Cloud",

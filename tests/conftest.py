@@ -13,10 +13,10 @@ import cv2
 import numpy as np
 import pytest
 
-from semslam.camera import Intrinsics
 from semslam.cli import main
 from semslam.errors import DatasetError
-from semslam.geometry import make_transform
+from semslam.geometry.camera import Intrinsics
+from semslam.geometry.se3 import make_transform
 from semslam.types import Frame, Trajectory
 
 SHARED = Path(__file__).resolve().parents[2] / "shared"

@@ -1,8 +1,8 @@
 """Making the segmenter that the settings ask for."""
 
-from loop.segmentation.cache import CachedSegmenter
-from loop.segmentation.segmenter import Segmenter
 from semslam.config import Config
+from semslam.loop.segmentation.segmenter import Segmenter
+from semslam.loop.segmentation.segmenters.cache import CachedSegmenter
 from semslam.plugins import load
 
 

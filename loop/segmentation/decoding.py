@@ -3,11 +3,11 @@
 import cv2
 import numpy as np
 
-from loop.segmentation.classes import NYU40_NAMES
-from loop.segmentation.photos import UInt8Array
 from semslam.config import SegmentationConfig
 from semslam.errors import ConfigError
-from semslam.geometry import Float32Array
+from semslam.geometry.se3 import Float32Array
+from semslam.loop.segmentation.classes import NYU40_NAMES
+from semslam.loop.segmentation.photos import UInt8Array
 from semslam.types import LabelMap
 
 STRIDE = 16

@@ -3,8 +3,8 @@
 import cv2
 import numpy as np
 
-from loop.segmentation.classes import PALETTE
-from loop.segmentation.photos import UInt8Array
+from semslam.loop.segmentation.classes import PALETTE
+from semslam.loop.segmentation.photos import UInt8Array
 from semslam.types import LabelMap
 
 LEGEND_WIDTH = 170

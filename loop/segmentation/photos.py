@@ -7,8 +7,8 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from loop.segmentation.classes import CLASS_COUNT
 from semslam.errors import DatasetError
+from semslam.loop.segmentation.classes import CLASS_COUNT
 
 UInt8Array = npt.NDArray[np.uint8]
 _SUFFIXES = (".jpg", ".jpeg", ".png")

@@ -11,8 +11,8 @@ from rich.table import Table
 from rich.text import Text
 
 if TYPE_CHECKING:
-    from semslam.metrics import LoopMetrics, Metrics
-    from semslam.slam import FrameState
+    from semslam.runs.metrics import LoopMetrics, Metrics
+    from semslam.system.slam import FrameState
 
 PIPED_WIDTH = 120
 # A file or a pipe has no width of its own; 80 columns would fold the wider tables.

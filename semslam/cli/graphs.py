@@ -15,7 +15,7 @@ from semslam.cli.console import out, remark
 from semslam.errors import ConfigError
 
 if TYPE_CHECKING:
-    from semslam.ledger import LedgerEntry, LoopContribution
+    from semslam.runs.ledger import LedgerEntry, LoopContribution
 
 RunFolder = Annotated[Path, typer.Argument(help="A run folder.")]
 
@@ -28,8 +28,8 @@ def ledger_command(
     as_json: options.Json = False,
 ) -> None:
     """Print the loop candidates of a run and what became of each."""
-    from semslam.ledger import Verdict
-    from semslam.results import read_ledger
+    from semslam.runs.ledger import Verdict
+    from semslam.runs.results import read_ledger
 
     if verdict is not None and verdict not in set(Verdict):
         raise ConfigError(f"There is no verdict '{verdict}'. Known: {', '.join(Verdict)}.")
@@ -56,8 +56,8 @@ def graph_command(
     overrides: options.Settings = None,
 ) -> None:
     """Optimise a graph from elsewhere and judge its loops."""
-    from backend.g2o import read_g2o, write_g2o
-    from backend.judge import judge_graph
+    from semslam.backend.analysis.judge import judge_graph
+    from semslam.backend.graph.g2o import read_g2o, write_g2o
 
     graph = read_g2o(file)
     solution = judge_graph(graph, options.settings(config, overrides).backend)
@@ -82,8 +82,8 @@ def stress_command(
     as_json: options.Json = False,
 ) -> None:
     """Put false loops into a saved run's graph and show what each back end makes of them."""
-    from backend.stress import Attack, FalseLoopKind
-    from semslam.stress_test import stress_run
+    from semslam.backend.analysis.stress import Attack, FalseLoopKind
+    from semslam.studies.false_loops import stress_run
 
     if kind not in set(FalseLoopKind):
         raise ConfigError(f"There is no kind '{kind}' of false loops. Known: {', '.join(FalseLoopKind)}.")

@@ -15,9 +15,9 @@ from semslam.cli.console import bar, out
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from loop.segmentation.evaluation import SegmentationScore
-    from loop.segmentation.training import Progress
     from semslam.config import Config
+    from semslam.loop.segmentation.training.evaluation import SegmentationScore
+    from semslam.loop.segmentation.training.training import Progress
     from semslam.types import UInt8Array
 
 IMAGES = (".png", ".jpg", ".jpeg")
@@ -37,9 +37,9 @@ def segment_command(
     """Label images: an overlay with a legend and a label image for each."""
     import cv2
 
-    from loop.segmentation.build import build_segmenter
-    from loop.segmentation.overlay import draw_overlay
-    from semslam.results import writing
+    from semslam.loop.segmentation.build import build_segmenter
+    from semslam.loop.segmentation.overlay import draw_overlay
+    from semslam.runs.results import writing
 
     images = list(_image_names(path))[::every]
     segmenter = build_segmenter(options.settings(config, overrides))
@@ -63,8 +63,8 @@ def train_command(
     seed: options.Seed = None,
 ) -> None:
     """Train the segmentation network; a killed training goes on where it stopped."""
-    from loop.segmentation.training import train
-    from semslam.results import writing
+    from semslam.loop.segmentation.training.training import train
+    from semslam.runs.results import writing
 
     chosen = options.settings(config, overrides, seed=seed)
     with writing(out_directory), bar("training", None, "steps") as update:
@@ -84,8 +84,8 @@ def average_command(
     overrides: options.Settings = None,
 ) -> None:
     """Average the weights of trained segmentation networks into one network."""
-    from loop.segmentation.averaging import average
-    from semslam.results import writing
+    from semslam.loop.segmentation.network.averaging import average
+    from semslam.runs.results import writing
 
     chosen = options.settings(config, overrides)
     with writing(out_directory):
@@ -94,8 +94,8 @@ def average_command(
 
 
 def _report_weights(weights: Path, directory: Path, config: "Config") -> None:
-    from loop.segmentation.build import build_segmenter
-    from loop.segmentation.evaluation import evaluate
+    from semslam.loop.segmentation.build import build_segmenter
+    from semslam.loop.segmentation.training.evaluation import evaluate
 
     out.print(f"Weights: {weights}", soft_wrap=True)
     if (directory / "val.txt").exists():
@@ -111,8 +111,8 @@ def evaluate_command(
     as_json: options.Json = False,
 ) -> None:
     """Score a segmenter on labelled photos."""
-    from loop.segmentation.build import build_segmenter
-    from loop.segmentation.evaluation import evaluate
+    from semslam.loop.segmentation.build import build_segmenter
+    from semslam.loop.segmentation.training.evaluation import evaluate
 
     segmenter = build_segmenter(options.settings(config, overrides))
     with bar(split, None, "photos") as update:

@@ -14,8 +14,8 @@ from semslam.errors import ConfigError, ResultsError
 if TYPE_CHECKING:
     from semslam.config import Config
     from semslam.datasets.dataset import Dataset
-    from semslam.metrics import Metrics
-    from semslam.recording import Recording, SavedFrontEnd
+    from semslam.runs.metrics import Metrics
+    from semslam.runs.recording import Recording, SavedFrontEnd
 
 RUNS = Path("runs")
 DEMO_SEQUENCE = "synthetic:house"
@@ -46,8 +46,8 @@ def run_command(
 ) -> None:
     """Run SLAM over a sequence and write a run folder."""
     from semslam.datasets import open_dataset
-    from semslam.recording import read_front_end
-    from semslam.results import link_latest, new_run_directory
+    from semslam.runs.recording import read_front_end
+    from semslam.runs.results import link_latest, new_run_directory
 
     saved = None if saved_run is None else read_front_end(saved_run)
     recording = None if saved is None else saved.recording
@@ -87,7 +87,7 @@ def compare_command(
 ) -> None:
     """Run a sequence once per detector, all else equal, and print the figures side by side."""
     from semslam.datasets import open_dataset
-    from semslam.results import link_latest, new_run_directory
+    from semslam.runs.results import link_latest, new_run_directory
 
     chosen = options.settings(config, overrides, odometry, None, seed, loader, start, max_frames, stride)
     dataset = open_dataset(sequence, config=chosen.dataset)
@@ -119,7 +119,7 @@ def demo_command(
 def _compare(
     dataset: "Dataset", config: "Config", detectors: Sequence[str], directory: Path, plots: bool, source: str
 ) -> list["Metrics"]:
-    from semslam.results import write_json
+    from semslam.runs.results import write_json
 
     runs: list[Metrics] = []
     for name in detectors:
@@ -153,8 +153,8 @@ def _run_one(
     source: str,
     recording: "Recording | None" = None,
 ) -> "Metrics":
-    from semslam.pipeline import replay, run
-    from semslam.results import check_writable, write_run
+    from semslam.runs.pipeline import replay, run
+    from semslam.runs.results import check_writable, write_run
 
     check_writable(directory)
     with bar(f"{dataset.name} {config.detector}", len(dataset)) as update:

@@ -14,7 +14,7 @@ from semslam.cli.console import bar, out, remarks
 from semslam.errors import ConfigError
 
 if TYPE_CHECKING:
-    from semslam.pair_trial import PairTrial
+    from semslam.studies.pairs import PairTrial
 
 MAX_COLUMNS = 5
 """More detectors than these make a table by change too wide for a terminal; it is in a file in any case."""
@@ -28,9 +28,9 @@ def eval_command(
     as_json: options.Json = False,
 ) -> None:
     """Score a trajectory file against ground truth."""
-    from eval.trajectory import coverage, score_trajectory
     from semslam.datasets.tum_format import read_trajectory
-    from semslam.metrics import TrajectoryMetrics
+    from semslam.eval.trajectory import coverage, score_trajectory
+    from semslam.runs.metrics import TrajectoryMetrics
 
     (estimated, estimate_notes), (true, truth_notes) = read_trajectory(estimate), read_trajectory(truth)
     score = score_trajectory(estimated, true, max_difference)
@@ -60,11 +60,11 @@ def loops_command(
     loader: options.Loader = None,
 ) -> None:
     """Score loop detectors on a sequence by precision and recall."""
-    from eval.precision_recall import draw_curves
-    from eval.reliability import draw_reliability
     from semslam.datasets import open_dataset
-    from semslam.experiments import PROBABILISTIC, compare_detectors
-    from semslam.results import check_place, write_json, writing
+    from semslam.eval.loops.precision_recall import draw_curves
+    from semslam.eval.loops.reliability import draw_reliability
+    from semslam.runs.results import check_place, write_json, writing
+    from semslam.studies.detectors import PROBABILISTIC, compare_detectors
 
     chosen = options.settings(config, overrides, odometry, loader=loader, start=start, max_frames=max_frames)
     names = options.detector_names(detectors)
@@ -113,9 +113,9 @@ def pairs_command(
     seed: options.Seed = None,
 ) -> None:
     """Tell the same place from look-alikes under changes of viewpoint, light and objects."""
-    from semslam.experiments import PROBABILISTIC
-    from semslam.pair_trial import PairPlan, try_pairs
-    from semslam.results import check_place, writing
+    from semslam.runs.results import check_place, writing
+    from semslam.studies.detectors import PROBABILISTIC
+    from semslam.studies.pairs import PairPlan, try_pairs
 
     chosen = options.settings(config, overrides, seed=seed)
     names = options.detector_names(detectors)
@@ -137,9 +137,9 @@ def pairs_command(
 
 def _write_pairs(trial: "PairTrial", directory: Path) -> None:
     """Write pairs.json, tables of all pairs and of all kinds of change, and a sheet of examples for each set."""
-    from eval.pair_sheet import draw_sheet
-    from eval.pair_table import kind_rows, pair_rows, told_by_kind
-    from semslam.results import write_json, writing
+    from semslam.eval.pairs.sheet import draw_sheet
+    from semslam.eval.pairs.table import kind_rows, pair_rows, told_by_kind
+    from semslam.runs.results import write_json, writing
 
     write_json(directory / "pairs.json", {"detectors": [asdict(quality) for quality in trial.qualities]})
     with writing(directory):
@@ -151,7 +151,7 @@ def _write_pairs(trial: "PairTrial", directory: Path) -> None:
 
 
 def _print_pairs(trial: "PairTrial") -> None:
-    from eval.pair_table import told_by_kind
+    from semslam.eval.pairs.table import told_by_kind
 
     sizes = ", ".join(f"{some.name} ({len(some.pairs)})" for some in trial.tested)
     table = Table(title=f"Share of pairs told rightly: {sizes}", title_justify="left")

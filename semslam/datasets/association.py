@@ -3,7 +3,7 @@
 import numpy as np
 import numpy.typing as npt
 
-from semslam.geometry import FloatArray
+from semslam.geometry.se3 import FloatArray
 
 
 def associate(first: FloatArray, second: FloatArray, window: float) -> npt.NDArray[np.int64]:

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import yaml
 
-from semslam.camera import NO_DISTORTION, Intrinsics
 from semslam.errors import ConfigError, DatasetError
+from semslam.geometry.camera import NO_DISTORTION, Intrinsics
 
 CAMERA_FILE = "camera.yaml"
 _REQUIRED = ("width", "height", "fx", "fy", "cx", "cy")

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from semslam.camera import Intrinsics
 from semslam.config import DatasetConfig
 from semslam.datasets.camera_file import CAMERA_FILE, CameraSetup, read_camera
-from semslam.geometry import FloatArray, make_transform, orthonormalise
+from semslam.geometry.camera import Intrinsics
+from semslam.geometry.se3 import FloatArray, make_transform, orthonormalise
 
 TUM_DEPTH_SCALE = 5000.0
 KINECT_READOUT = 0.026

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from semslam.camera import Intrinsics
-from semslam.geometry import Float32Array, FloatArray
+from semslam.geometry.camera import Intrinsics
+from semslam.geometry.se3 import Float32Array, FloatArray
 
 
 def register_depth(

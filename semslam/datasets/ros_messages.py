@@ -5,8 +5,8 @@ from typing import Any
 import cv2
 import numpy as np
 
-from semslam.camera import NO_DISTORTION, Intrinsics
 from semslam.errors import ConfigError, DatasetError
+from semslam.geometry.camera import NO_DISTORTION, Intrinsics
 from semslam.types import Float32Array, UInt8Array
 
 _TO_RGB = {

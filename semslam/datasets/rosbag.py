@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
-from semslam.camera import Intrinsics
 from semslam.config import DatasetConfig
 from semslam.datasets.association import associate
 from semslam.datasets.cameras import find_camera
@@ -15,6 +14,7 @@ from semslam.datasets.images import check_size
 from semslam.datasets.ros_messages import to_color, to_depth, to_intrinsics
 from semslam.datasets.tum_format import read_trajectory
 from semslam.errors import DatasetError
+from semslam.geometry.camera import Intrinsics
 from semslam.types import Frame, Trajectory
 
 if TYPE_CHECKING:

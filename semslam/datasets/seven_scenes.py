@@ -5,7 +5,6 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from semslam.camera import Intrinsics
 from semslam.config import DatasetConfig
 from semslam.datasets.camera_file import CameraSetup
 from semslam.datasets.cameras import KINECT_READOUT, find_camera
@@ -13,7 +12,8 @@ from semslam.datasets.image_sequence import ImagePair, ImageSequence
 from semslam.datasets.images import read_depth
 from semslam.datasets.registration import register_depth
 from semslam.errors import DatasetError
-from semslam.geometry import FloatArray, invert, is_rigid, make_transform, orthonormalise
+from semslam.geometry.camera import Intrinsics
+from semslam.geometry.se3 import FloatArray, invert, is_rigid, make_transform, orthonormalise
 from semslam.types import Float32Array, Trajectory
 
 COLOR_CAMERA = Intrinsics(640, 480, 525.0, 525.0, 320.0, 240.0, readout=KINECT_READOUT)

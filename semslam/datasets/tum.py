@@ -22,7 +22,7 @@ from semslam.datasets.image_sequence import ImagePair, ImageSequence
 from semslam.datasets.images import IMAGE_SUFFIXES
 from semslam.datasets.tum_format import read_trajectory
 from semslam.errors import DatasetError
-from semslam.geometry import FloatArray
+from semslam.geometry.se3 import FloatArray
 from semslam.types import Trajectory
 
 ASSOCIATION_FILES = ("associations.txt", "association.txt", "associate.txt", "associated.txt")

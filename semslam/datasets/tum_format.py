@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from semslam.errors import TrajectoryError
-from semslam.geometry import FloatArray, quaternions_to_rotations, rotations_to_quaternions
+from semslam.geometry.se3 import FloatArray, quaternions_to_rotations, rotations_to_quaternions
 from semslam.types import Trajectory
 
 COLUMNS = "timestamp tx ty tz qx qy qz qw"

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from semslam.datasets.synthetic.textures import SIZE, Image
-from semslam.geometry import Float32Array
+from semslam.geometry.se3 import Float32Array
 
 LEVELS = 8
 BORDER = 2

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from semslam.geometry import Float32Array, FloatArray
+from semslam.geometry.se3 import Float32Array, FloatArray
 
 
 @dataclass(frozen=True, slots=True, eq=False)

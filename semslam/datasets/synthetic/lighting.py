@@ -12,7 +12,7 @@ import numpy.typing as npt
 from semslam.datasets.synthetic import labels
 from semslam.datasets.synthetic.casting import RayCaster
 from semslam.datasets.synthetic.scene import Light, Mesh
-from semslam.geometry import Float32Array, FloatArray
+from semslam.geometry.se3 import Float32Array, FloatArray
 
 LAMPS = ("day", "lamps")
 DIRECTIONS = 48

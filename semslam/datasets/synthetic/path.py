@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from semslam.datasets.synthetic.routes import Route, Stop
-from semslam.geometry import FloatArray
+from semslam.geometry.se3 import FloatArray
 
 SPEED = 0.55
 """Metres a second."""

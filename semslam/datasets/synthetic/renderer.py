@@ -5,12 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from semslam.camera import Intrinsics
 from semslam.datasets.synthetic.atlas import TextureAtlas
 from semslam.datasets.synthetic.casting import Hits, RayCaster
 from semslam.datasets.synthetic.lighting import LAMPS, bake
 from semslam.datasets.synthetic.scene import Mesh, Scene, build_mesh
-from semslam.geometry import Float32Array, FloatArray
+from semslam.geometry.camera import Intrinsics
+from semslam.geometry.se3 import Float32Array, FloatArray
 
 GAMMA = 2.2
 SHOULDER = 190.0

@@ -9,7 +9,7 @@ import numpy as np
 from semslam.datasets.synthetic import labels
 from semslam.datasets.synthetic.scene import Light
 from semslam.datasets.synthetic.shapes import Part, box, placed, quad
-from semslam.geometry import exp_so3
+from semslam.geometry.se3 import exp_so3
 
 WALL = 0.1
 """Metres between two rooms."""

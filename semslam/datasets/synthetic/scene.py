@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from semslam.datasets.synthetic.atlas import Material
 from semslam.datasets.synthetic.shapes import Part
-from semslam.geometry import FloatArray
+from semslam.geometry.se3 import FloatArray
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,7 +5,7 @@ import numpy as np
 import numpy.typing as npt
 
 from semslam.datasets.synthetic.renderer import View
-from semslam.geometry import Float32Array
+from semslam.geometry.se3 import Float32Array
 
 MIN_DEPTH, MAX_DEPTH = 0.4, 6.0
 COLOR_SIGMA = 2.5

@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from semslam.geometry import FloatArray, exp_so3
+from semslam.geometry.se3 import FloatArray, exp_so3
 
 Vector = Sequence[float] | FloatArray
 SPACING = 0.22

@@ -1,0 +1,1 @@
+"""Measurements on graphs: contribution of loops, false loops, simulated graphs."""

@@ -1,0 +1,1 @@
+"""Graphs of poses: edges, factors, connected components and files."""

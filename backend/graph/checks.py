@@ -1,0 +1,51 @@
+"""The border to GTSAM: it takes a NaN or a skewed rotation without a word, so nothing unchecked gets past here."""
+
+import numpy as np
+import numpy.typing as npt
+
+from semslam.errors import GraphError
+from semslam.geometry.se3 import is_rigid, orthonormalise
+from semslam.types import FloatArray
+
+SYMMETRY_TOLERANCE = 1e-6
+
+
+def checked_pose(T: npt.ArrayLike, what: str) -> FloatArray:
+    """Return a rigid transform (4, 4) as float64, its rotation projected onto SO(3) to the last digit.
+
+    Args:
+        T: the transform.
+        what: its name in the error, such as "The pose of keyframe 7".
+
+    Raises:
+        GraphError: it is not (4, 4), not finite, or not a rigid transform within 1e-3.
+    """
+    array = np.asarray(T, dtype=np.float64)
+    if array.shape != (4, 4):
+        raise GraphError(f"{what} has the shape {array.shape}, not (4, 4).")
+    if not np.isfinite(array).all():
+        raise GraphError(f"{what} is not finite.")
+    if not is_rigid(array):
+        raise GraphError(f"{what} is not a rigid transform: its rotation is not orthonormal and right-handed.")
+    return orthonormalise(array)
+
+
+def checked_covariance(covariance: npt.ArrayLike, what: str) -> FloatArray:
+    """Return a covariance (6, 6) as float64, made symmetric to the last digit.
+
+    Raises:
+        GraphError: it is not (6, 6), not finite, not symmetric, or not positive definite.
+    """
+    array = np.asarray(covariance, dtype=np.float64)
+    if array.shape != (6, 6):
+        raise GraphError(f"{what} has a covariance of the shape {array.shape}, not (6, 6).")
+    if not np.isfinite(array).all():
+        raise GraphError(f"{what} has a covariance that is not finite.")
+    if np.abs(array - array.T).max() > SYMMETRY_TOLERANCE * np.abs(array).max():
+        raise GraphError(f"{what} has a covariance that is not symmetric.")
+    array = (array + array.T) / 2
+    try:
+        np.linalg.cholesky(array)
+    except np.linalg.LinAlgError:
+        raise GraphError(f"{what} has a covariance that is not positive definite.") from None
+    return array

@@ -1,0 +1,144 @@
+"""Pose graphs as g2o text: VERTEX_SE3:QUAT, EDGE_SE3:QUAT, FIX; TORO's VERTEX3 and EDGE3 are read too.
+
+A file's information matrix is the upper triangle in the order x, y, z, then rotation: translation first, while
+everything here is rotation first. As in GTSAM the rotation part is per radian.
+"""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from semslam.backend.graph.checks import checked_covariance, checked_pose
+from semslam.backend.graph.products import Edge, GraphSolution, PosedGraph
+from semslam.errors import GraphError, SemslamError
+from semslam.geometry.se3 import compose, make_transform, quaternions_to_rotations, rotations_to_quaternions
+from semslam.types import FloatArray
+
+TRIANGLE = np.triu_indices(6)
+SWAPPED = [3, 4, 5, 0, 1, 2]
+"""Translation-first rows as rotation-first ones, and back."""
+FIELDS = {"VERTEX_SE3:QUAT": 8, "VERTEX3": 7, "EDGE_SE3:QUAT": 30, "EDGE3": 29, "FIX": 1}
+"""Words after the tag."""
+SKIPPED = ("VERTEX2", "EDGE2", "VERTEX_SE2", "EDGE_SE2")
+
+
+def write_g2o(path: Path, graph: PosedGraph | GraphSolution) -> None:
+    """Write a graph, whole or not at all; figures keep every digit.
+
+    Of a solution the optimised poses are written, with odometry and the accepted loops.
+
+    Raises:
+        GraphError: the file cannot be written.
+    """
+    lines = [f"VERTEX_SE3:QUAT {key} {_pose_text(T)}" for key, T in sorted(graph.poses.items())]
+    lines += [f"FIX {key}" for key in graph.anchors]
+    for edge in graph.edges:
+        information = np.linalg.inv(edge.covariance)[np.ix_(SWAPPED, SWAPPED)]
+        figures = " ".join(repr(float(value)) for value in information[TRIANGLE])
+        lines.append(f"EDGE_SE3:QUAT {edge.from_key} {edge.to_key} {_pose_text(edge.T_from_to)} {figures}")
+    try:
+        partial = path.with_name(f".{path.name}.partial")
+        partial.write_text("\n".join(lines) + "\n", encoding="ascii")
+        partial.replace(path)
+    except OSError as error:
+        raise GraphError(f"The graph cannot be written to {path}: {error}.") from error
+
+
+def read_g2o(path: Path) -> PosedGraph:
+    """Read a graph; keyframes without a value of their own are chained from the edges.
+
+    Raises:
+        GraphError: the file cannot be read, is no 3-D pose graph, or a line is malformed; the message names it.
+    """
+    poses: dict[int, FloatArray] = {}
+    edges: list[Edge] = []
+    anchors: list[int] = []
+    for number, tag, words in _lines(path):
+        where = f"Line {number} of {path.name}"
+        if len(words) != FIELDS[tag]:
+            raise GraphError(f"{where} has {len(words)} figures after {tag}, not {FIELDS[tag]}.")
+        keys = [_key(word, where) for word in words[: 2 if tag.startswith("EDGE") else 1]]
+        figures = _figures(words[len(keys) :], where)
+        if tag.startswith("VERTEX"):
+            if keys[0] in poses:
+                raise GraphError(f"{where} gives keyframe {keys[0]} a second time.")
+            poses[keys[0]] = _pose(figures, where)
+        elif tag == "FIX":
+            anchors += keys
+        else:
+            edges.append(_edge(keys[0], keys[1], figures, where))
+    if not poses and not edges:
+        raise GraphError(f"{path} holds no 3-D pose graph.")
+    _chain(poses, edges)
+    return PosedGraph(poses, tuple(edges), tuple(key for key in anchors if key in poses))
+
+
+def _lines(path: Path) -> Iterator[tuple[int, str, list[str]]]:
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise GraphError(f"The graph {path} cannot be read: {error}.") from error
+    for number, line in enumerate(text.splitlines(), 1):
+        tag, *words = line.split() or [""]
+        if tag in SKIPPED:
+            raise GraphError(f"Line {number} of {path.name} is of a 2-D graph ({tag}); only 3-D ones are read.")
+        if tag in FIELDS:
+            yield number, tag, words
+
+
+def _key(word: str, where: str) -> int:
+    if not word.isdecimal():
+        raise GraphError(f"{where} has the key {word}, not a whole number.")
+    return int(word)
+
+
+def _figures(words: list[str], where: str) -> list[float]:
+    try:
+        return [float(word) for word in words]
+    except ValueError:
+        raise GraphError(f"{where} holds a word that is not a number.") from None
+
+
+def _pose(figures: list[float], where: str) -> FloatArray:
+    try:
+        R = quaternions_to_rotations(figures[3:])[0] if len(figures) == 7 else _rotation_of_euler(*figures[3:])
+    except SemslamError:
+        raise GraphError(f"{where} has a rotation that is zero or not finite.") from None
+    return checked_pose(make_transform(R, figures[:3]), where)
+
+
+def _rotation_of_euler(roll: float, pitch: float, yaw: float) -> FloatArray:
+    (cr, cp, cy), (sr, sp, sy) = np.cos([roll, pitch, yaw]), np.sin([roll, pitch, yaw])
+    return np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )
+
+
+def _edge(from_key: int, to_key: int, figures: list[float], where: str) -> Edge:
+    information = np.zeros((6, 6))
+    information[TRIANGLE] = figures[-21:]
+    information += np.triu(information, 1).T
+    try:
+        covariance = np.linalg.inv(information)[np.ix_(SWAPPED, SWAPPED)]
+    except np.linalg.LinAlgError:
+        raise GraphError(f"{where} has an information matrix that cannot be inverted.") from None
+    T_from_to = _pose(figures[:-21], where)
+    return Edge(from_key, to_key, T_from_to, checked_covariance(covariance, where))
+
+
+def _chain(poses: dict[int, FloatArray], edges: list[Edge]) -> None:
+    for edge in edges:
+        if edge.to_key not in poses:
+            start = poses.setdefault(edge.from_key, np.eye(4))
+            poses[edge.to_key] = compose([edge.T_from_to], start)[1]
+        poses.setdefault(edge.from_key, np.eye(4))
+
+
+def _pose_text(T: FloatArray) -> str:
+    figures = [*T[:3, 3], *rotations_to_quaternions(T[:3, :3])[0]]
+    return " ".join(repr(float(value)) for value in figures)

@@ -1,0 +1,1 @@
+"""Rejection of false loops."""

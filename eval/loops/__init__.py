@@ -1,0 +1,1 @@
+"""Loop detectors against ground truth."""

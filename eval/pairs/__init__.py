@@ -1,0 +1,1 @@
+"""Detectors on pairs of images (paper, Table 2)."""

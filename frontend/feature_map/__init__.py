@@ -1,0 +1,1 @@
+"""Odometry against a local map of landmarks."""

@@ -1,0 +1,230 @@
+"""Odometry against a map of landmarks that it builds and adjusts as it goes."""
+
+from typing import Self
+
+import numpy as np
+
+from semslam.config import Config
+from semslam.features import FeatureExtractor
+from semslam.frontend.feature_map.bridge import Bridge, NoBridge
+from semslam.frontend.feature_map.landmarks import NONE
+from semslam.frontend.feature_map.local_map import LocalMap, MapKeyframe
+from semslam.frontend.feature_map.map_pose import Located, View, locate
+from semslam.frontend.feature_map.mapping import Mapper
+from semslam.frontend.feature_map.relocalisation import match_and_solve, relocalise
+from semslam.frontend.feature_map.rolling_shutter import ReadoutEstimate, rectify, velocity_of
+from semslam.frontend.prediction import ConstantVelocity, check_frame, first_motion, wide_covariance
+from semslam.geometry.reprojection import measure
+from semslam.geometry.se3 import invert, rotation_angle, transform_points
+from semslam.runtime.threads import one_blas_thread
+from semslam.types import Features, FloatArray, Frame, IntArray, Motion, Observations, TrackingStatus
+
+NOTHING: IntArray = np.zeros(0, dtype=np.int64)
+
+
+class FeatureMapOdometry:
+    """Tracks frames against the covisible part of a map (after ORB-SLAM2, Mur-Artal and Tardós, T-RO 2017).
+
+    A frame's pose is predicted, landmarks of the map are looked for where they should be, and the pose is refined on
+    their pixels and disparities. Keyframes extend the map; the newest are adjusted together, one step a frame. A frame
+    that cannot be tracked is looked for in all maps; where that fails for a while, a new map starts.
+    """
+
+    def __init__(self, config: Config, bridge: Bridge | None = None) -> None:
+        self._config = config.feature_map
+        self._bridge = bridge or NoBridge()
+        self._seed = config.seed
+        # Fewer and wider levels than the verification's: cheaper, and landmarks are placed better.
+        self._scale = config.feature_map.scale
+        pyramid = {"levels": config.feature_map.levels, "scale": config.feature_map.scale}
+        self._extractor = FeatureExtractor(config.features.model_copy(update=pyramid))
+        self._map = LocalMap(config.features.count, self._scale)
+        self._mapper = Mapper(self._map, config.feature_map)
+        self._prediction = ConstantVelocity()
+        self._readout = ReadoutEstimate(config.feature_map.readout, config.feature_map.readout_sigma)
+        self._reference: MapKeyframe | None = None
+        self._T_ref_prev: FloatArray = np.eye(4)
+        self._T_reported: FloatArray = np.eye(4)
+        self._tracked: IntArray = NOTHING
+        self._keyframe_time = 0.0
+        self._lost_since: float | None = None
+        self._usable_since: float | None = None
+        self._map_id = 0
+        self._started = False
+
+    @classmethod
+    def from_config(cls, config: Config) -> Self:
+        """Build it from the settings."""
+        return cls(config)
+
+    @property
+    def readout_seconds(self) -> float:
+        """The read-out time of the rolling shutter as believed now, seconds."""
+        return self._readout.seconds
+
+    def track(self, frame: Frame) -> Motion:
+        """Motion since the previous frame, with the landmarks seen; LOST where the frame's place was not found.
+
+        Raises:
+            DatasetError: the frame's size does not fit its intrinsics.
+        """
+        check_frame(frame)
+        with one_blas_thread():
+            motion = self._track(frame)
+        self._bridge.note(frame)
+        return motion
+
+    def _track(self, frame: Frame) -> Motion:
+        raw = self._extractor.extract(frame)
+        self._mapper.proceed()
+        if not self._started:
+            self._started = True
+            if self._config.readout is None:
+                self._readout = ReadoutEstimate(frame.intrinsics.readout, self._config.readout_sigma)
+            self._prediction.tracked(frame.timestamp, np.eye(4))
+            self._start_map(self._view(frame, raw, np.zeros(6)))
+            return first_motion()
+        elapsed = self._prediction.seconds_since_last(frame.timestamp)
+        T_map_prev = self._pose_of_previous()
+        T_prev_cur = self._prediction.predict(frame.timestamp)
+        view = self._view(frame, raw, velocity_of(T_prev_cur, elapsed))
+        coarse = self._locate_coarsely(view, T_map_prev @ T_prev_cur)
+        if coarse is None:
+            return self._cross(frame, view, T_map_prev)
+        if self._lost_since is None:
+            view = self._view(frame, raw, velocity_of(invert(T_map_prev) @ coarse.T_map_cam, elapsed))
+        found = self._locate(view, coarse.T_map_cam, self._around(coarse.landmarks), self._config.narrow_radius)
+        if found is None:
+            return self._cross(frame, view, T_map_prev)
+        return self._accept(view, raw, found, T_map_prev)
+
+    def _view(self, frame: Frame, raw: Features, velocity: FloatArray) -> View:
+        features = rectify(raw, frame.intrinsics, velocity, self._readout.seconds)
+        sigmas = self._scale ** features.octaves.astype(np.float64)
+        measured = measure(features.pixels, features.depths, sigmas)
+        return View(frame.timestamp, features, measured, frame.intrinsics, velocity)
+
+    def _pose_of_previous(self) -> FloatArray:
+        """The previous frame's pose, moved along with its keyframe where the map has been adjusted since."""
+        if self._reference is None or self._lost_since is not None:
+            return self._T_reported
+        return self._reference.T_map_cam @ self._T_ref_prev
+
+    def _locate(self, view: View, T_map_cam: FloatArray, wanted: IntArray, *radii: float) -> Located | None:
+        return locate(self._map, view, T_map_cam, wanted, radii, self._scale, self._config.min_inliers)
+
+    def _locate_coarsely(self, view: View, guess: FloatArray) -> Located | None:
+        """Where the frame is, from the prediction; failing that, from descriptors alone."""
+        if self._reference is None or len(view.features) < self._config.min_inliers:
+            return None
+        radius = self._config.radius
+        if self._lost_since is None:
+            found = self._locate(view, guess, self._tracked, radius)
+            if found is not None:
+                return found
+        around = self._around(self._tracked)
+        T_map_cam = match_and_solve(self._map, view, around, self._config.min_inliers, self._seed)
+        if T_map_cam is not None:
+            found = self._locate(view, T_map_cam, around, radius)
+            if found is not None:
+                return found
+        place = relocalise(self._map, view, self._config.min_inliers, self._seed)
+        if place is None:
+            return None
+        self._map_id = place.map_id
+        return self._locate(view, place.T_map_cam, self._map.seen_from(place.keyframes), radius)
+
+    def _around(self, landmarks: IntArray) -> IntArray:
+        """Identities of the landmarks that keyframes see which share some with these."""
+        keyframes = self._map.covisible(landmarks, self._map_id)[: self._config.local_keyframes]
+        return self._map.seen_from(keyframes)
+
+    def _accept(self, view: View, raw: Features, found: Located, T_map_prev: FloatArray) -> Motion:
+        covariance = found.covariance * self._config.covariance_scale
+        status = TrackingStatus.OK if len(found.landmarks) >= self._config.sure_inliers else TrackingStatus.DEGRADED
+        if self._lost_since is not None:
+            status = TrackingStatus.RELOCALISED
+            covariance = covariance + wide_covariance(view.timestamp - self._lost_since)
+            self._reference = self._map.keyframes[self._map.covisible(found.landmarks, self._map_id)[0]]
+        else:
+            self._learn_readout(view, raw, found)
+        assert self._reference is not None
+        self._prediction.tracked(view.timestamp, invert(T_map_prev) @ found.T_map_cam)
+        self._lost_since = self._usable_since = None
+        features = view.features
+        rows = found.keypoints
+        sigmas = np.float32(self._scale) ** features.octaves[rows]
+        seen = Observations(found.landmarks, features.pixels[rows], features.depths[rows], sigmas)
+        T_prev_cur = invert(self._T_reported) @ found.T_map_cam
+        self._T_reported = found.T_map_cam
+        self._T_ref_prev = invert(self._reference.T_map_cam) @ found.T_map_cam
+        self._tracked = found.landmarks
+        self._map.landmarks.visible[found.in_view] += 1
+        self._map.landmarks.found[found.landmarks] += 1
+        if self._is_keyframe_due(view, found):
+            self._insert(view, found.T_map_cam, found.landmarks, found.keypoints)
+        return Motion(T_prev_cur, covariance, status, self._map_id, len(found.landmarks), seen)
+
+    def _learn_readout(self, view: View, raw: Features, found: Located) -> None:
+        points = transform_points(invert(found.T_map_cam), self._map.landmarks.positions[found.landmarks])
+        measured = view.measured.take(found.keypoints)
+        self._readout.learn(
+            points, measured, raw.pixels[found.keypoints, 1], view.camera, view.velocity, self._readout.seconds
+        )
+
+    def _cross(self, frame: Frame, view: View, T_map_prev: FloatArray) -> Motion:
+        """Where the map is not met, go on by another kind of registration, if there is one and it succeeds."""
+        found = None
+        if self._lost_since is None and self._reference is not None:
+            found = self._bridge.register(frame, self._prediction.predict(frame.timestamp))
+        if found is None or self._reference is None:
+            return self._lose(view)
+        self._prediction.tracked(frame.timestamp, found.T_ref_cam)
+        T_map_cam = T_map_prev @ found.T_ref_cam
+        T_prev_cur = invert(self._T_reported) @ T_map_cam
+        self._T_reported = T_map_cam
+        self._T_ref_prev = invert(self._reference.T_map_cam) @ T_map_cam
+        if view.timestamp - self._keyframe_time >= self._config.restart_seconds:
+            self._start_map(view)  # continues the map with what is seen here
+        return Motion(T_prev_cur, found.covariance, TrackingStatus.DEGRADED, self._map_id, found.inliers)
+
+    def _lose(self, view: View) -> Motion:
+        """Predict; and where good images have not met the map for a while, start a new one."""
+        self._lost_since = view.timestamp if self._lost_since is None else self._lost_since
+        usable = np.count_nonzero(view.features.depths) >= self._config.min_landmarks
+        self._usable_since = (self._usable_since or view.timestamp) if usable else None
+        restart = self._usable_since is not None and (
+            self._reference is None or view.timestamp - self._usable_since >= self._config.restart_seconds
+        )
+        motion = self._prediction.lost(view.timestamp, self._map.next_map_id if restart else self._map_id)
+        self._T_reported = self._T_reported @ motion.T_prev_cur
+        if restart:
+            self._map_id = motion.map_id
+            self._lost_since = self._usable_since = None
+            self._start_map(view)
+        return motion
+
+    def _start_map(self, view: View) -> None:
+        if np.count_nonzero(view.features.depths) >= self._config.min_landmarks:
+            self._insert(view, self._T_reported, NOTHING, NOTHING)
+
+    def _is_keyframe_due(self, view: View, found: Located) -> bool:
+        assert self._reference is not None
+        elapsed = view.timestamp - self._keyframe_time
+        depths = np.count_nonzero(view.features.depths)
+        if elapsed < self._config.min_interval or depths < self._config.min_landmarks:
+            return False
+        T_ref_cam = invert(self._reference.T_map_cam) @ found.T_map_cam
+        return bool(
+            elapsed >= self._config.max_interval
+            or np.linalg.norm(T_ref_cam[:3, 3]) > self._config.max_translation
+            or rotation_angle(T_ref_cam) > self._config.max_rotation
+            or len(found.landmarks) < self._config.min_share * depths
+        )
+
+    def _insert(self, view: View, T_map_cam: FloatArray, landmarks: IntArray, keypoints: IntArray) -> None:
+        self._reference = self._mapper.insert(view, T_map_cam, landmarks, keypoints, self._map_id)
+        self._T_ref_prev = np.eye(4)
+        self._keyframe_time = view.timestamp
+        sightings = self._map.sightings(self._reference.id)
+        self._tracked = sightings[sightings != NONE].astype(np.int64)

@@ -1,0 +1,1 @@
+"""Odometry that registers a frame to an earlier one."""

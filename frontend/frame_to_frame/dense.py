@@ -1,0 +1,117 @@
+"""Dense RGB-D odometry, frame to frame: colour and depth of all pixels (Open3D's hybrid method)."""
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any, Self
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from semslam.config import Config, DenseConfig
+from semslam.frontend.frame_to_frame.reference import ReferenceOdometry, Registration
+from semslam.geometry.camera import Intrinsics
+from semslam.geometry.se3 import adjoint, invert, is_rigid
+from semslam.runtime.threads import one_open3d_thread
+from semslam.types import FloatArray, Frame
+
+MIN_SIZE = 32
+"""Pixels; smaller images have no pyramid."""
+MEET = 0.05
+"""Metres within which two depths are of one surface."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DenseView:
+    """A frame as Open3D takes it.
+
+    Attributes:
+        rgbd: Open3D's tensor RGBDImage, undistorted; float colour, depth in metres.
+        intrinsics: the camera, without distortion.
+    """
+
+    rgbd: Any
+    intrinsics: Intrinsics
+
+
+class DenseRegistrar:
+    """Registers undistorted RGB-D images to one another."""
+
+    def __init__(self, config: DenseConfig) -> None:
+        self._config = config
+
+    def prepare(self, frame: Frame) -> DenseView | None:
+        """Undistort the images; None where they are tiny, black or nearly without depth."""
+        depth = np.where((frame.depth > 0) & (frame.depth <= self._config.max_depth), frame.depth, 0).astype(np.float32)
+        if min(depth.shape) < MIN_SIZE or np.count_nonzero(depth) < self._config.min_coverage * depth.size:
+            return None
+        if frame.color.std() < self._config.min_contrast:
+            return None
+        import open3d as o3d
+
+        color, depth = _undistort(frame.color, depth, frame.intrinsics)
+        image, tensor = o3d.t.geometry.Image, o3d.core.Tensor.from_numpy
+        rgbd = o3d.t.geometry.RGBDImage(image(tensor(color.astype(np.float32) / 255.0)), image(tensor(depth)))
+        return DenseView(rgbd, frame.intrinsics)
+
+    def register(self, reference: DenseView, current: DenseView, T_ref_cam: FloatArray) -> Registration | None:
+        """Register ``current`` to ``reference`` from a first guess; None where too few pixels agree."""
+        import open3d as o3d
+
+        odometry = o3d.t.pipelines.odometry
+        matrix = o3d.core.Tensor.from_numpy(current.intrinsics.matrix)
+        guess = o3d.core.Tensor.from_numpy(T_ref_cam)
+        far = self._config.max_depth
+        criteria = [odometry.OdometryConvergenceCriteria(steps) for steps in self._config.steps]
+        try:
+            with one_open3d_thread():
+                found = odometry.rgbd_odometry_multi_scale(
+                    current.rgbd, reference.rgbd, matrix, guess, 1.0, far, criteria, odometry.Method.Hybrid
+                )
+                T = found.transformation.numpy()
+                information = odometry.compute_odometry_information_matrix(
+                    current.rgbd.depth, reference.rgbd.depth, matrix, found.transformation, MEET, 1.0, far
+                ).numpy()
+        except RuntimeError:  # "Singular 6x6": no pixel pairs, or none that fix the pose
+            return None
+        if not is_rigid(T) or found.fitness < self._config.min_fitness:
+            return None
+        if np.linalg.cond(information) > 1e12:
+            return None
+        # Open3D moves the reference's points; the covariance belongs to the camera's side.
+        carry = adjoint(invert(T))
+        variance = self._config.sigma**2
+        covariance = carry @ np.linalg.inv(information) @ carry.T * variance
+        inliers = round(found.fitness * current.intrinsics.width * current.intrinsics.height)
+        return Registration(T, covariance, inliers, found.fitness < 2 * self._config.min_fitness)
+
+
+class DenseOdometry(ReferenceOdometry[DenseView]):
+    """Registers each frame to the one before by colour and depth (Park et al., ICCV 2017). Drifts: it has no map.
+
+    LOST where there is no depth or the images do not meet.
+    """
+
+    @classmethod
+    def from_config(cls, config: Config) -> Self:
+        """Build it from the settings."""
+        return cls(DenseRegistrar(config.dense))
+
+
+def _undistort(
+    color: npt.NDArray[np.uint8], depth: npt.NDArray[np.float32], camera: Intrinsics
+) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
+    if not camera.is_distorted:
+        return color, depth
+    u, v = _undistortion_maps(camera)
+    # Depth is not interpolated: between two surfaces there is nothing.
+    return cv2.remap(color, u, v, cv2.INTER_LINEAR), cv2.remap(depth, u, v, cv2.INTER_NEAREST)
+
+
+@lru_cache(maxsize=8)
+def _undistortion_maps(camera: Intrinsics) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
+    size = (camera.width, camera.height)
+    maps = cv2.initUndistortRectifyMap(
+        camera.matrix, np.array(camera.distortion), np.eye(3), camera.matrix, size, cv2.CV_32FC1
+    )
+    return np.asarray(maps[0]), np.asarray(maps[1])

@@ -1,0 +1,44 @@
+"""Dense RGB-D odometry against the last keyframe, started from matched features where there are any."""
+
+from dataclasses import dataclass
+from typing import Self
+
+from semslam.config import Config
+from semslam.frontend.frame_to_frame.dense import DenseRegistrar, DenseView
+from semslam.frontend.frame_to_frame.feature import FeatureRegistrar, FeatureView
+from semslam.frontend.frame_to_frame.reference import Reach, ReferenceOdometry, Registration
+from semslam.types import FloatArray, Frame
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _View:
+    dense: DenseView
+    features: FeatureView | None
+
+
+class _Registrar:
+    def __init__(self, config: Config) -> None:
+        self._dense = DenseRegistrar(config.dense)
+        self._features = FeatureRegistrar(config)
+
+    def prepare(self, frame: Frame) -> _View | None:
+        dense = self._dense.prepare(frame)
+        return None if dense is None else _View(dense, self._features.prepare(frame))
+
+    def register(self, reference: _View, current: _View, T_ref_cam: FloatArray) -> Registration | None:
+        if reference.features is not None and current.features is not None:
+            matched = self._features.register(reference.features, current.features, T_ref_cam)
+            T_ref_cam = T_ref_cam if matched is None else matched.T_ref_cam
+        return self._dense.register(reference.dense, current.dense, T_ref_cam)
+
+
+class DenseKeyframeOdometry(ReferenceOdometry[_View]):
+    """Registers frames to a keyframe by colour and depth, so that errors add up by keyframes and not by frames.
+
+    LOST where there is no depth or the images do not meet.
+    """
+
+    @classmethod
+    def from_config(cls, config: Config) -> Self:
+        """Build it from the settings."""
+        return cls(_Registrar(config), Reach(config.dense.keyframe_translation, config.dense.keyframe_rotation))

@@ -1,0 +1,64 @@
+"""Odometry from ORB matches and PnP, frame to frame."""
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+
+from semslam.config import Config
+from semslam.features import FeatureExtractor, match_descriptors, solve_pnp
+from semslam.frontend.frame_to_frame.reference import ReferenceOdometry, Registration
+from semslam.types import Features, FloatArray, Frame, Intrinsics
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FeatureView:
+    """Keypoints of a frame and its camera."""
+
+    features: Features
+    intrinsics: Intrinsics
+
+
+class FeatureRegistrar:
+    """Registers frames to one another by matches and PnP."""
+
+    def __init__(self, config: Config) -> None:
+        self._config = config.feature
+        self._seed = config.seed
+        self._extractor = FeatureExtractor(config.features)
+
+    def prepare(self, frame: Frame) -> FeatureView | None:
+        """Find keypoints; None where too few have depth."""
+        features = self._extractor.extract(frame)
+        if np.count_nonzero(features.depths) < self._config.min_inliers:
+            return None
+        return FeatureView(features, frame.intrinsics)
+
+    def register(self, reference: FeatureView, current: FeatureView, T_ref_cam: FloatArray) -> Registration | None:
+        """Register ``current`` to ``reference``; the guess is not needed. None where too few matches agree."""
+        matches = match_descriptors(reference.features.descriptors, current.features.descriptors)
+        matches = matches[reference.features.depths[matches[:, 0]] > 0]
+        found = solve_pnp(
+            reference.features.points[matches[:, 0]],
+            current.features.pixels[matches[:, 1]],
+            current.intrinsics,
+            threshold_px=self._config.threshold_px,
+            seed=self._seed,
+        )
+        inliers = 0 if found is None else int(found.inliers.sum())
+        if found is None or inliers < self._config.min_inliers:
+            return None
+        covariance = found.covariance * self._config.covariance_scale
+        return Registration(found.T_ref_cam, covariance, inliers, inliers < 2 * self._config.min_inliers)
+
+
+class FeatureOdometry(ReferenceOdometry[FeatureView]):
+    """Matches ORB features with the previous frame's and solves PnP among wrong matches. Drifts: it has no map.
+
+    LOST where too few matches agree on a motion.
+    """
+
+    @classmethod
+    def from_config(cls, config: Config) -> Self:
+        """Build it from the settings."""
+        return cls(FeatureRegistrar(config))

@@ -1,0 +1,1 @@
+"""Loop detectors, one folder for each method."""

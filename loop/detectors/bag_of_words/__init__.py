@@ -1,0 +1,1 @@
+"""Bags of binary words."""

@@ -1,0 +1,77 @@
+"""Bags of binary words (Gálvez-López and Tardós, T-RO 2012)."""
+
+from typing import Self
+
+import numpy as np
+
+from semslam.config import Config, DbowConfig, LoopConfig
+from semslam.loop.detectors.bag_of_words.vocabulary import Vocabulary, load_vocabulary
+from semslam.loop.detectors.bag_of_words.word_index import Bag, WordIndex
+from semslam.loop.detectors.common.memo import LastView
+from semslam.loop.detectors.common.timeline import Timeline
+from semslam.types import FloatArray, KeyframeView, LoopCandidate, LoopEvidence, UInt8Array
+
+
+class DbowDetector:
+    """Vocabulary tree, tf-idf, L1 score, inverted file, temporal grouping.
+
+    Images that follow each other within ``group`` seconds are grouped: the score with a keyframe is the mean over
+    the keyframes around it, so that one lucky picture does not make a loop. The original divides by the score with
+    the picture before; that is left out, as it sinks recall where keyframes overlap unevenly.
+    """
+
+    name = "dbow"
+    needs_labels = False
+
+    def __init__(self, vocabulary: Vocabulary, config: DbowConfig, loops: LoopConfig) -> None:
+        self._vocabulary = vocabulary
+        self._group = config.group
+        self._timeline = Timeline(loops, config.min_score)
+        self._index = WordIndex()
+        self._bag = LastView(lambda view: make_bag(vocabulary, view.keyframe.features.descriptors))
+
+    @classmethod
+    def from_config(cls, config: Config) -> Self:
+        """Take the sections ``dbow`` and ``loops``.
+
+        Raises:
+            ModelError: the shipped vocabulary is missing or damaged.
+        """
+        return cls(load_vocabulary(), config.dbow, config.loops)
+
+    def query(self, view: KeyframeView) -> list[LoopCandidate]:
+        """Candidates by grouped score."""
+        if not len(self._timeline):
+            return []
+        alone = self._index.scores(self._bag(view))
+        scores = grouped(alone, self._timeline.stamps, self._group)
+        return [
+            LoopCandidate(
+                view.keyframe.id, self._timeline.id_at(at), float(scores[at]), self.name,
+                LoopEvidence(figures={"words": float(alone[at]), "grouped": float(scores[at])}),
+            )
+            for at in self._timeline.best(view.keyframe, scores)
+        ]  # fmt: skip
+
+    def add(self, view: KeyframeView) -> None:
+        """Remember the view's words."""
+        self._index.add(self._bag(view))
+        self._timeline.add(view.keyframe)
+
+
+def make_bag(vocabulary: Vocabulary, descriptors: UInt8Array) -> Bag:
+    """The words of descriptors (N, 32) with their tf-idf weights."""
+    words, counts = np.unique(vocabulary.words(descriptors), return_counts=True)
+    weights = counts * vocabulary.weights[words]
+    used = weights > 0
+    weights = weights[used]
+    return words[used], (weights / max(float(weights.sum()), 1e-12)).astype(np.float32)
+
+
+def grouped(scores: FloatArray, stamps: FloatArray, window: float) -> FloatArray:
+    """Mean of the scores (N,) over the entries within ``window`` seconds of each; stamps (N,) ascend."""
+    first = np.searchsorted(stamps, stamps - window - 1e-6)
+    last = np.searchsorted(stamps, stamps + window + 1e-6)
+    sums = np.concatenate([[0.0], np.cumsum(scores)])
+    means: FloatArray = np.clip((sums[last] - sums[first]) / np.maximum(last - first, 1), 0.0, 1.0)
+    return means

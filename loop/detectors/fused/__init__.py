@@ -1,0 +1,1 @@
+"""Semantics fused with the appearance of the whole image and with local features."""

@@ -1,0 +1,134 @@
+"""Semantics together with the rest of the image: the question that the paper leaves open in its section 5."""
+
+from dataclasses import dataclass
+from typing import Self
+
+import cv2
+import numpy as np
+
+from semslam.config import Config, FusedConfig, LoopConfig
+from semslam.errors import ConfigError
+from semslam.loop.detectors.bag_of_words.detector import make_bag
+from semslam.loop.detectors.bag_of_words.vocabulary import Vocabulary, load_vocabulary
+from semslam.loop.detectors.bag_of_words.word_index import Bag, WordIndex
+from semslam.loop.detectors.common.backbone import Backbone
+from semslam.loop.detectors.common.cosine_index import WholeIndex
+from semslam.loop.detectors.common.memo import LastView
+from semslam.loop.detectors.common.timeline import Timeline
+from semslam.loop.detectors.fused.class_index import ClassIndex
+from semslam.loop.detectors.fused.fusion import ClassFeatures, FusionModel, load_fusion, pool_classes
+from semslam.loop.detectors.fused.upright import roll_of, turn_image, turn_labels
+from semslam.loop.segmentation.classes import MOVABLE
+from semslam.loop.segmentation.decoding import shrink
+from semslam.types import Float32Array, FloatArray, KeyframeView, LoopCandidate, LoopEvidence, UInt8Array
+
+MIDDLE_CHANNELS = 96
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Look:
+    """What is kept of a view."""
+
+    whole: Float32Array
+    bag: Bag
+    classes: ClassFeatures
+
+
+class FusedDetector:
+    """The look of the whole image, its words, and the look of each class in it, joined to a probability.
+
+    - whole: two layers of the encoder, pooled to one vector by a generalised mean of their positive and negative
+      parts and projected so that what viewpoint and light change is shrunk; cosine;
+    - words: square root of the L1 score of tf-idf bags of ORB words;
+    - classes: the encoder's mid-level features averaged over each segmented class, as they differ from the class's
+      usual look, compared class by class and weighed by the class's share of the image; classes that people move
+      count less than structure.
+
+    Images are turned upright by the tracked roll first. Cosines are taken without half of what the keyframes so far
+    have in common. A logistic function, learned on warped and relit photos of other places, joins the three. Some of
+    the candidates are the best by words alone: they are rarely the likeliest, and often the ones whose pose can be
+    verified.
+    """
+
+    name = "fused"
+    needs_labels = True
+
+    def __init__(
+        self, backbone: Backbone, vocabulary: Vocabulary, model: FusionModel, config: FusedConfig, loops: LoopConfig
+    ) -> None:
+        self._backbone, self._vocabulary, self._model, self._config = backbone, vocabulary, model, config
+        self._max_candidates = loops.max_candidates
+        self._timeline = Timeline(loops, config.min_probability)
+        self._whole = WholeIndex(model.projection.shape[1])
+        self._words = WordIndex()
+        self._classes = ClassIndex(MIDDLE_CHANNELS)
+        self._labels: list[UInt8Array] = []
+        self._look = LastView(self._describe)
+
+    @classmethod
+    def from_config(cls, config: Config) -> Self:
+        """Take the sections ``fused``, ``loops`` and ``segmentation`` (for the network).
+
+        Raises:
+            ModelError: weights are missing or damaged.
+        """
+        backbone = Backbone.from_config(config)
+        return cls(backbone, load_vocabulary(), load_fusion(), config.fused, config.loops)
+
+    def query(self, view: KeyframeView) -> list[LoopCandidate]:
+        """Candidates by probability, with the share of each part and the labels in common.
+
+        Raises:
+            ConfigError: the view carries no labels.
+        """
+        if not len(self._timeline):
+            return []
+        parts = self._parts(self._look(view))
+        probability = self._model.probability(parts)
+        chosen = self._choose(view, probability, parts[:, 1])
+        return [self._candidate(view, at, float(probability[at]), parts[at]) for at in chosen]
+
+    def add(self, view: KeyframeView) -> None:
+        """Remember the view's look."""
+        look = self._look(view)
+        self._whole.add(look.whole)
+        self._words.add(look.bag)
+        self._classes.add(look.classes)
+        self._labels.append(look.classes.labels)
+        self._timeline.add(view.keyframe)
+
+    def _describe(self, view: KeyframeView) -> _Look:
+        if view.labels is None:
+            raise ConfigError(f"The detector '{self.name}' needs a segmentation, and none came with the keyframe.")
+        roll, size = roll_of(view.keyframe.T_odom_cam), self._backbone.size
+        encoding = self._backbone.encode(turn_image(shrink(view.color, size), roll))
+        labels = turn_labels(cv2.resize(view.labels.labels, size, interpolation=cv2.INTER_NEAREST), roll)  # type: ignore[arg-type]
+        movable = frozenset(i for i, name in enumerate(view.labels.names) if name in MOVABLE)
+        usual = self._model.usual_looks(view.labels.names)
+        classes = pool_classes(encoding.middle, labels, movable).against(usual)
+        bag = make_bag(self._vocabulary, view.keyframe.features.descriptors)
+        return _Look(self._model.whole(encoding), bag, classes)
+
+    def _parts(self, look: _Look) -> FloatArray:
+        """Scores (N, 3) of whole image, words and classes with each remembered keyframe."""
+        words = np.sqrt(self._words.scores(look.bag))
+        return np.column_stack([self._whole.scores(look.whole), words, self._classes.scores(look.classes)])
+
+    def _choose(self, view: KeyframeView, probability: FloatArray, words: FloatArray) -> list[int]:
+        """Positions by falling probability; a share of them are the best by words."""
+        likely = self._timeline.best(view.keyframe, probability)
+        spare = min(int(self._config.word_share * self._max_candidates), self._max_candidates - 1)
+        kept = likely[: self._max_candidates - spare]
+        plausible = np.where(probability >= self._config.min_word_probability, words, 0.0)
+        by_words = [at for at in self._timeline.nearest(view.keyframe, plausible) if at not in kept]
+        rest = [at for at in likely if at not in kept and at not in by_words[:spare]]
+        chosen = kept + (by_words[:spare] + rest)[: self._max_candidates - len(kept)]
+        return sorted(chosen, key=lambda at: (-probability[at], at))
+
+    def _candidate(self, view: KeyframeView, at: int, probability: float, parts: FloatArray) -> LoopCandidate:
+        assert view.labels is not None
+        common = np.intersect1d(self._look(view).classes.labels, self._labels[at])
+        labels = tuple(view.labels.names[label] for label in common)
+        figures = {"whole": float(parts[0]), "words": float(parts[1]), "classes": float(parts[2])}
+        evidence = LoopEvidence(labels, figures=figures)
+        return LoopCandidate(view.keyframe.id, self._timeline.id_at(at), probability, self.name, evidence)

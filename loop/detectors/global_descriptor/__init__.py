@@ -1,0 +1,1 @@
+"""Detectors that describe a whole image by one vector."""

@@ -1,0 +1,1 @@
+"""Loop detection from semantic nodes (Li et al. 2022)."""

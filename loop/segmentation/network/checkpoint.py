@@ -1,0 +1,59 @@
+"""Weights on disk: float16 state dicts, read with a clear word when they do not fit."""
+
+import os
+import pickle
+from pathlib import Path
+
+import torch
+from torch import Tensor, nn
+
+from semslam.errors import ModelError
+from semslam.loop.segmentation.network.network import DeepLab, build_mobilenet_deeplab
+
+SHIPPED = Path(__file__).parents[1] / "weights" / "deeplabv3plus_mobilenetv2_nyu40.pt"
+
+
+def read_tensors(path: Path) -> dict[str, Tensor]:
+    """Read a state dict as float32.
+
+    Raises:
+        ModelError: the file is missing, damaged or something else.
+    """
+    try:
+        state = torch.load(path, map_location="cpu", weights_only=True)
+    except FileNotFoundError as error:
+        raise ModelError(f"There are no network weights at {path}.") from error
+    except (OSError, RuntimeError, EOFError, ValueError, pickle.UnpicklingError) as error:
+        raise ModelError(f"The network weights {path} are damaged or not a PyTorch state dict.") from error
+    if not isinstance(state, dict) or not all(isinstance(v, Tensor) for v in state.values()):
+        raise ModelError(f"The network weights {path} are not a plain state dict.")
+    return {name: v.float() if v.is_floating_point() else v for name, v in state.items()}
+
+
+def load_network(path: Path) -> DeepLab:
+    """The MobileNetV2 network of a checkpoint, with a decoder as wide as it was trained.
+
+    Raises:
+        ModelError: the file cannot be read or belongs to another network.
+    """
+    state = read_tensors(path)
+    try:
+        network = build_mobilenet_deeplab(decoder_channels=state["classifier.weight"].shape[1])
+        network.load_state_dict(state)
+    except (KeyError, IndexError, RuntimeError) as error:
+        raise ModelError(f"The weights {path} belong to another network than the one asked for.") from error
+    return network
+
+
+def save_weights(network: nn.Module, path: Path) -> None:
+    """Write a network's state as float16, whole or not at all."""
+    state = {name: v.half() if v.is_floating_point() else v for name, v in network.state_dict().items()}
+    save_atomically(state, path)
+
+
+def save_atomically(content: object, path: Path) -> None:
+    """Write with ``torch.save`` beside the target, then rename: a kill leaves the old file."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(f"{path.name}.{os.getpid()}.part")
+    torch.save(content, temporary)
+    temporary.replace(path)

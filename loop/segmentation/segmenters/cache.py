@@ -1,0 +1,63 @@
+"""Segmentations on disk, so that a sweep over settings does not segment an image twice."""
+
+import hashlib
+import os
+import zipfile
+from pathlib import Path
+
+import numpy as np
+
+from semslam.loop.segmentation.photos import UInt8Array
+from semslam.loop.segmentation.segmenter import Segmenter
+from semslam.types import LabelMap
+
+
+class CachedSegmenter:
+    """Keeps what another segmenter answers, by the content of the image and of the segmenter.
+
+    Files are written whole or not at all; one that cannot be read is made anew. Confidences are kept in 255
+    steps, and given back so on the first answer too: a run is the same with a warm and a cold cache.
+
+    Args:
+        inner: who answers; its ``fingerprint`` must not be empty.
+        folder: where the files go.
+    """
+
+    def __init__(self, inner: Segmenter, folder: Path) -> None:
+        self._inner, self._folder = inner, folder
+        self.fingerprint = inner.fingerprint
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The inner segmenter's classes."""
+        return self._inner.names
+
+    def segment(self, color: UInt8Array, frame_index: int | None = None) -> LabelMap:
+        """Look the labels of an image (H, W, 3) up, or ask for them and keep them."""
+        key = hashlib.sha256(self.fingerprint.encode() + str(color.shape).encode() + color.tobytes()).hexdigest()
+        path = self._folder / key[:2] / f"{key}.npz"
+        kept = self._read(path)
+        if kept is None:
+            answer = self._inner.segment(color, frame_index)
+            steps = None if answer.confidence is None else np.round(answer.confidence * 255).astype(np.uint8)
+            kept = (answer.labels, steps)
+            _write(path, *kept)
+        labels, steps = kept
+        return LabelMap(labels, self.names, None if steps is None else steps.astype(np.float32) / np.float32(255))
+
+    @staticmethod
+    def _read(path: Path) -> tuple[UInt8Array, UInt8Array | None] | None:
+        try:
+            with np.load(path) as arrays:
+                return arrays["labels"], arrays.get("confidence")
+        except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+            return None
+
+
+def _write(path: Path, labels: UInt8Array, confidence: UInt8Array | None) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    extra = {} if confidence is None else {"confidence": confidence}
+    temporary = path.with_name(f"{path.name}.{os.getpid()}.part")
+    with temporary.open("wb") as file:
+        np.savez_compressed(file, labels=labels, **extra)  # type: ignore[arg-type]
+    temporary.replace(path)

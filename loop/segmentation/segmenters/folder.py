@@ -1,0 +1,81 @@
+"""Labels from a folder of images, so that any outside network can serve."""
+
+from pathlib import Path
+from typing import Self
+
+import cv2
+import numpy as np
+
+from semslam.config import Config
+from semslam.errors import ConfigError, DatasetError
+from semslam.loop.segmentation.classes import NYU40_NAMES
+from semslam.loop.segmentation.photos import UInt8Array
+from semslam.types import LabelMap
+
+NAMES_FILE = "classes.txt"
+
+
+class FolderSegmenter:
+    """Reads the label image of each frame.
+
+    The folder holds one single-channel PNG per frame with values into the class list. A file whose stem is the
+    frame's index (``12.png``, ``000012.png``) is taken for it; where no stem is a plain number, files are taken in
+    the order of their names (time stamps). ``classes.txt`` may name the classes, one a line from void on; without
+    it they are NYUv2's 40.
+
+    Args:
+        folder: where the images are.
+
+    Raises:
+        DatasetError: the folder does not exist or holds no PNG.
+    """
+
+    fingerprint = ""
+
+    def __init__(self, folder: Path) -> None:
+        paths = sorted(folder.glob("*.png")) if folder.is_dir() else []
+        if not paths:
+            raise DatasetError(f"There are no label images (*.png) in {folder}.")
+        numbered = all(path.stem.isdecimal() for path in paths)
+        self._paths = {int(path.stem): path for path in paths} if numbered else dict(enumerate(paths))
+        self._folder = folder
+        self.names = _read_names(folder / NAMES_FILE)
+
+    @classmethod
+    def from_config(cls, config: Config) -> Self:
+        """Read the folder that ``segmentation.labels_dir`` names.
+
+        Raises:
+            ConfigError: the setting is empty.
+        """
+        folder = config.segmentation.labels_dir
+        if folder is None:
+            raise ConfigError("The segmenter 'folder' needs the setting 'segmentation.labels_dir'.")
+        return cls(folder)
+
+    def segment(self, color: UInt8Array, frame_index: int | None = None) -> LabelMap:
+        """Look up the labels of frame ``frame_index``, enlarged to the image's size by nearest neighbour.
+
+        Raises:
+            DatasetError: no index is given, or the frame's image is missing, damaged or holds an unnamed label.
+        """
+        if frame_index is None or frame_index not in self._paths:
+            raise DatasetError(f"There is no label image for frame {frame_index} in {self._folder}.")
+        path = self._paths[frame_index]
+        labels = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+        if labels is None or labels.ndim != 2:
+            raise DatasetError(f"The label image {path} is damaged or has more than one channel.")
+        if labels.max(initial=0) >= len(self.names):
+            raise DatasetError(f"The label image {path} holds a label beyond the {len(self.names)} class names.")
+        size = (color.shape[1], color.shape[0])
+        full = cv2.resize(labels.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST)
+        return LabelMap(np.asarray(full, dtype=np.uint8), self.names)
+
+
+def _read_names(path: Path) -> tuple[str, ...]:
+    if not path.is_file():
+        return NYU40_NAMES
+    names = tuple(line.strip() for line in path.read_text(encoding="utf-8").splitlines() if line.strip())
+    if not names or names[0] != "void":
+        raise DatasetError(f"The class list {path} must begin with 'void'.")
+    return names

@@ -1,0 +1,100 @@
+"""The shipped network through ONNX Runtime: the default segmenter."""
+
+import hashlib
+from pathlib import Path
+from typing import Self
+
+import numpy as np
+import onnxruntime
+
+from semslam.config import Config
+from semslam.errors import ModelError
+from semslam.loop.segmentation.classes import NYU40_NAMES
+from semslam.loop.segmentation.decoding import decode, input_size, shrink
+from semslam.loop.segmentation.photos import UInt8Array
+from semslam.types import LabelMap
+
+WEIGHTS = Path(__file__).parents[1] / "weights"
+SHIPPED_INT8 = WEIGHTS / "deeplabv3plus_mobilenetv2_nyu40_int8.onnx"
+SHIPPED = WEIGHTS / "deeplabv3plus_mobilenetv2_nyu40.pt"
+
+
+class OnnxSegmenter:
+    """Runs an ONNX graph made by ``semslam.loop.segmentation.network.export``, one image at a time.
+
+    Args:
+        graph: the serialised graph.
+        size: width and height of its input.
+        threads: inference threads; they do not spin while they wait, since other stages need the cores.
+        min_confidence: below it a pixel becomes void.
+    """
+
+    def __init__(self, graph: bytes, size: tuple[int, int], threads: int = 1, min_confidence: float = 0.0) -> None:
+        self._session = open_session(graph, size, threads)
+        self._size, self._min_confidence = size, min_confidence
+        settings = f"{size} {min_confidence}".encode()
+        self.fingerprint = hashlib.sha256(graph + settings).hexdigest()
+
+    @classmethod
+    def from_config(cls, config: Config) -> Self:
+        """Load the shipped int8 graph, or the weights that ``segmentation.weights`` names.
+
+        Raises:
+            ModelError: the weights are missing, damaged or of another network.
+            ConfigError: the input size does not fit the network.
+        """
+        settings = config.segmentation
+        graph = load_graph(settings.weights, settings.precision)
+        return cls(graph, input_size(settings), settings.threads, settings.min_confidence)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The 40 NYUv2 classes after void."""
+        return NYU40_NAMES
+
+    def segment(self, color: UInt8Array, frame_index: int | None = None) -> LabelMap:
+        """Label an RGB image (H, W, 3) uint8."""
+        image = shrink(color, self._size)
+        logits = self._session.run(["logits"], {"image": image[None]})[0]
+        return decode(np.asarray(logits)[0], (color.shape[1], color.shape[0]), self._min_confidence)
+
+
+def load_graph(weights: Path | None, precision: str) -> bytes:
+    """The graph of an ``.onnx`` file, or of a checkpoint that is exported here in float32.
+
+    Raises:
+        ModelError: the file is missing, damaged or of another network.
+    """
+    path = weights or (SHIPPED_INT8 if precision == "int8" else SHIPPED)
+    if path.suffix != ".onnx":
+        from semslam.loop.segmentation.network.checkpoint import load_network
+        from semslam.loop.segmentation.network.export import float_graph
+
+        return float_graph(load_network(path))
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise ModelError(f"There are no network weights at {path}.") from error
+
+
+def open_session(graph: bytes, size: tuple[int, int], threads: int) -> onnxruntime.InferenceSession:
+    """Open a graph for inputs of one size.
+
+    Raises:
+        ModelError: the graph is damaged or of another network.
+    """
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = threads
+    options.inter_op_num_threads = 1
+    options.log_severity_level = 3
+    options.add_session_config_entry("session.intra_op.allow_spinning", "0")
+    options.add_free_dimension_override_by_name("width", size[0])
+    options.add_free_dimension_override_by_name("height", size[1])
+    try:
+        session = onnxruntime.InferenceSession(graph, options, providers=["CPUExecutionProvider"])
+    except Exception as error:  # the runtime's errors have no common base of their own
+        raise ModelError("The network weights are damaged or not an ONNX graph.") from error
+    outputs = {out.name for out in session.get_outputs()}
+    if [i.name for i in session.get_inputs()] != ["image"] or not {"logits", "features"} <= outputs:
+        raise ModelError("The ONNX graph is not one that semslam exported.")
+    return session

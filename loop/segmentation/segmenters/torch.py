@@ -1,0 +1,54 @@
+"""The same network through PyTorch: slower, for checking and for machines without ONNX Runtime's speed-ups."""
+
+import hashlib
+from pathlib import Path
+from typing import Self
+
+import torch
+
+from semslam.config import Config
+from semslam.loop.segmentation.classes import NYU40_NAMES
+from semslam.loop.segmentation.decoding import decode, input_size, shrink
+from semslam.loop.segmentation.network.checkpoint import SHIPPED, load_network
+from semslam.loop.segmentation.photos import UInt8Array
+from semslam.types import LabelMap
+
+
+class TorchSegmenter:
+    """Runs a checkpoint in float32 with PyTorch.
+
+    Args:
+        weights: the checkpoint.
+        size: width and height of the network's input.
+        threads: PyTorch's threads; they are one setting for the whole process.
+        min_confidence: below it a pixel becomes void.
+
+    Raises:
+        ModelError: the weights are missing, damaged or of another network.
+    """
+
+    def __init__(self, weights: Path, size: tuple[int, int], threads: int = 1, min_confidence: float = 0.0) -> None:
+        self._network = load_network(weights)
+        self._network.eval()
+        torch.set_num_threads(threads)
+        self._size, self._min_confidence = size, min_confidence
+        settings = f"torch {size} {min_confidence}".encode()
+        self.fingerprint = hashlib.sha256(weights.read_bytes() + settings).hexdigest()
+
+    @classmethod
+    def from_config(cls, config: Config) -> Self:
+        """Load the shipped checkpoint, or the one that ``segmentation.weights`` names."""
+        settings = config.segmentation
+        return cls(settings.weights or SHIPPED, input_size(settings), settings.threads, settings.min_confidence)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The 40 NYUv2 classes after void."""
+        return NYU40_NAMES
+
+    @torch.inference_mode()
+    def segment(self, color: UInt8Array, frame_index: int | None = None) -> LabelMap:
+        """Label an RGB image (H, W, 3) uint8."""
+        pixels = torch.from_numpy(shrink(color, self._size)[None])
+        logits, _ = self._network(pixels.permute(0, 3, 1, 2).float() / 127.5 - 1.0)
+        return decode(logits[0].numpy(), (color.shape[1], color.shape[0]), self._min_confidence)

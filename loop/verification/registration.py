@@ -1,0 +1,121 @@
+"""Registration of two keyframes' clouds, with Open3D."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from semslam.errors import ConfigError
+from semslam.runtime.threads import one_open3d_thread
+from semslam.types import Cloud, FloatArray, IntArray
+
+MAX_ITERATIONS = 30
+ICP_KINDS = ("point_to_plane", "generalized", "colored")
+GICP_EPSILON = 1e-3
+"""Variance along the normal over that in the plane; Open3D's default."""
+GEOMETRY_SHARE = 0.968
+"""Weight of geometry against colour in coloured ICP; Open3D's default."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Fit:
+    """How well a cloud lies on another one at some pose.
+
+    Attributes:
+        fitness: share of the source points with a target point near enough, 0..1.
+        rmse: metres, root mean square distance of those.
+        pairs: (K, 2) source and target indices of those.
+    """
+
+    fitness: float
+    rmse: float
+    pairs: IntArray
+
+
+def refine(
+    source: Cloud,
+    target: Cloud,
+    T_target_source: FloatArray,
+    distances: tuple[float, ...],
+    kind: str = "point_to_plane",
+) -> FloatArray:
+    """ICP with Tukey's loss, coarse to fine.
+
+    Args:
+        source: moves.
+        target: stays.
+        T_target_source: (4, 4) first guess.
+        distances: metres, farthest correspondence of each pass; also the loss's width.
+        kind: "point_to_plane" (Chen and Medioni, 1992); "generalized" (Segal et al., RSS 2009), plane to plane;
+            "colored" (Park et al., ICCV 2017), which also compares colours and needs them in both clouds.
+
+    Returns:
+        (4, 4) T_target_source; the guess where nothing corresponds.
+
+    Raises:
+        ConfigError: the kind is unknown, or asks for colours that a cloud does not have.
+    """
+    if kind not in ICP_KINDS:
+        raise ConfigError(f"There is no kind of ICP '{kind}'. Known: {', '.join(ICP_KINDS)}.")
+    if kind == "colored" and (source.colors is None or target.colors is None):
+        raise ConfigError("Coloured ICP needs keyframes whose clouds have colours.")
+    T = T_target_source
+    with one_open3d_thread():
+        moving, fixed = _open3d_cloud(source), _open3d_cloud(target)
+        for distance in distances:
+            T = _icp_pass(moving, fixed, T, distance, kind)
+    return T
+
+
+def _icp_pass(moving: Any, fixed: Any, T: FloatArray, distance: float, kind: str) -> FloatArray:
+    from open3d.pipelines import registration as o3d
+
+    if o3d.evaluate_registration(moving, fixed, distance, T).fitness == 0:
+        return T  # coloured ICP raises where nothing corresponds
+    loss = o3d.TukeyLoss(distance)
+    stop = o3d.ICPConvergenceCriteria(max_iteration=MAX_ITERATIONS)
+    if kind == "generalized":
+        estimation = o3d.TransformationEstimationForGeneralizedICP(GICP_EPSILON, loss)
+        found = o3d.registration_generalized_icp(moving, fixed, distance, T, estimation, stop)
+    elif kind == "colored":
+        estimation = o3d.TransformationEstimationForColoredICP(GEOMETRY_SHARE, loss)
+        found = o3d.registration_colored_icp(moving, fixed, distance, T, estimation, stop)
+    else:
+        estimation = o3d.TransformationEstimationPointToPlane(loss)
+        found = o3d.registration_icp(moving, fixed, distance, T, estimation, stop)
+    return np.array(found.transformation)
+
+
+def measure_fit(source: Cloud, target: Cloud, T_target_source: FloatArray, distance: float) -> Fit:
+    """Count the source points that lie within ``distance`` metres of the target."""
+    from open3d.pipelines import registration
+
+    with one_open3d_thread():
+        found = registration.evaluate_registration(
+            _open3d_cloud(source), _open3d_cloud(target), distance, T_target_source
+        )
+    pairs = np.asarray(found.correspondence_set, dtype=np.int64).reshape(-1, 2)
+    return Fit(float(found.fitness), float(found.inlier_rmse), pairs)
+
+
+def plane_information(source: Cloud, target: Cloud, T_target_source: FloatArray, pairs: IntArray) -> FloatArray:
+    """Information (6, 6), rotation first, of T_target_source under unit noise along the target's normals.
+
+    The Gauss-Newton Hessian of the point-to-plane error in the tangent of the source frame.
+    """
+    points = source.points[pairs[:, 0]].astype(np.float64)
+    normals = target.normals[pairs[:, 1]].astype(np.float64) @ T_target_source[:3, :3]
+    jacobian = np.hstack([np.cross(points, normals), normals])
+    information: FloatArray = jacobian.T @ jacobian
+    return information
+
+
+def _open3d_cloud(cloud: Cloud) -> Any:
+    from open3d import geometry
+    from open3d.utility import Vector3dVector
+
+    out = geometry.PointCloud(Vector3dVector(cloud.points.astype(np.float64)))
+    out.normals = Vector3dVector(cloud.normals.astype(np.float64))
+    if cloud.colors is not None:
+        out.colors = Vector3dVector(cloud.colors / 255.0)
+    return out

@@ -1,0 +1,164 @@
+"""From a candidate to a constraint: a pose from features, refined on the clouds, behind gates."""
+
+from typing import Protocol, Self, runtime_checkable
+
+import numpy as np
+
+from semslam.config import Config, VerificationConfig
+from semslam.geometry.se3 import invert, orthonormalise
+from semslam.loop.verification.free_space import free_space_violation
+from semslam.loop.verification.guess import FeaturePair, Guess, pose_from_nodes
+from semslam.loop.verification.registration import Fit, measure_fit, plane_information, refine
+from semslam.types import (
+    FloatArray,
+    IntArray,
+    Keyframe,
+    LoopCandidate,
+    LoopConstraint,
+    LoopRejection,
+    RejectionReason,
+)
+
+FITNESS_SLACK = 0.95
+"""Share of the first guess's fitness that ICP's pose must keep: the loss may trade some points for a better fit."""
+ROTATION_GROWTH, TRANSLATION_GROWTH = 0.5, 1.5
+"""Powers of the overlap that errors grow with as it falls, fitted to ground truth on two real sequences."""
+MIN_SEEN = 0.05
+"""Overlap below which they grow no more; the gates refuse such loops."""
+
+
+@runtime_checkable
+class LoopVerifier(Protocol):
+    """Decides by geometry whether two keyframes show the same place, and from where. Deterministic for a seed."""
+
+    def verify(self, query: Keyframe, match: Keyframe, candidate: LoopCandidate) -> LoopConstraint | LoopRejection:
+        """The relative pose with its covariance, or the first test that failed."""
+
+
+class IcpVerifier:
+    """A first guess from features and one from semantic nodes, ICP, and gates that test what comes out.
+
+    PnP RANSAC on feature matches, and the rigid motion of matched semantic nodes, each say where the query may stand.
+    From there features are matched anew near where they are predicted, also after ICP; the guess that most features
+    agree on is kept. ICP on the keyframes' clouds then refines it, unless its pose fits the clouds worse or moves the
+    agreeing features far, as where a view holds one plane. A constraint needs enough agreeing features, fitness, a
+    small residual, overlap seen from both sides, no points in space that the other view looked through, and a
+    position that is determined.
+    """
+
+    def __init__(self, config: VerificationConfig, seed: int) -> None:
+        self._config = config
+        self._seed = seed
+
+    @classmethod
+    def from_config(cls, config: Config) -> Self:
+        """Take the section ``verification`` and the seed."""
+        return cls(config.verification, config.seed)
+
+    def verify(self, query: Keyframe, match: Keyframe, candidate: LoopCandidate) -> LoopConstraint | LoopRejection:
+        """See ``LoopVerifier``; the reason, figure and limit of a rejection are those of the first gate that closed."""
+        pair = FeaturePair(query, match, self._config.max_reprojection)
+        matches = pair.matches(self._config.match_ratio)
+        guess, figures = self._best_guess(query, match, candidate, pair, matches)
+        found, limit = 0 if guess is None else len(guess.matches), self._config.min_inliers
+        if guess is None or found < limit:
+            scarce = len(matches) < limit
+            reason = RejectionReason.FEW_MATCHES if scarce else RejectionReason.FEW_INLIERS
+            return LoopRejection(candidate, reason, len(matches) if scarce else found, limit)
+        smaller = min(len(query.cloud), len(match.cloud))
+        if smaller < self._config.min_points:
+            return LoopRejection(candidate, RejectionReason.NO_CLOUD, smaller, self._config.min_points)
+        T_match_query, fit, method = self._refine(query, match, pair, guess)
+        overlap = self._overlap(query, match, T_match_query)
+        covariance = self._covariance(query, match, guess, T_match_query, fit, method, overlap)
+        refusal = self._gate(query, match, candidate, T_match_query, fit, overlap, covariance)
+        return refusal or LoopConstraint(
+            candidate, T_match_query, covariance, fit.fitness, fit.rmse, overlap, found, method, figures,
+            shared=pair.rows(guess.matches),
+        )  # fmt: skip
+
+    def _best_guess(
+        self, query: Keyframe, match: Keyframe, candidate: LoopCandidate, pair: FeaturePair, matches: IntArray
+    ) -> tuple[Guess | None, dict[str, float]]:
+        """The guess that most features agree on, and how many agreed on each."""
+        config = self._config
+        figures: dict[str, float] = {}
+        starts: list[tuple[str, FloatArray]] = []
+        pnp = pair.solve(matches, self._seed)
+        if pnp is not None and pnp.inliers.sum() >= config.min_first_inliers:
+            starts.append(("features", pnp.T_ref_cam))
+            figures["first_inliers"] = float(pnp.inliers.sum())
+        nodes = pose_from_nodes(candidate.evidence.nodes, query.intrinsics, match.intrinsics)
+        if nodes is not None:
+            starts.append(("nodes", nodes[0]))
+            figures["matched_nodes"] = float(nodes[1])
+        best: Guess | None = None
+        for source, T in starts:
+            guess = pair.support(T, source)
+            if _count(guess) < config.min_inliers and _count(best) < config.min_inliers:
+                T_icp = orthonormalise(refine(query.cloud, match.cloud, T, config.search_distances, config.icp))
+                guess = max(guess, pair.support(T_icp, source), key=_count)
+            figures[f"{source}_guess"] = float(_count(guess))
+            best = max(best, guess, key=_count)
+        return best, figures
+
+    def _refine(self, query: Keyframe, match: Keyframe, pair: FeaturePair, guess: Guess) -> tuple[FloatArray, Fit, str]:
+        """The better of the two poses, how it fits, and its name."""
+        config = self._config
+        T_pnp = guess.T_match_query
+        T_icp = orthonormalise(refine(query.cloud, match.cloud, T_pnp, config.icp_distances, config.icp))
+        fit_pnp, fit_icp = (measure_fit(query.cloud, match.cloud, T, config.fit_distance) for T in (T_pnp, T_icp))
+        fits = fit_icp.fitness >= FITNESS_SLACK * fit_pnp.fitness
+        if fits and np.median(pair.errors(guess.matches, T_icp)) <= config.max_shift:
+            return T_icp, fit_icp, "icp"
+        return T_pnp, fit_pnp, "pnp"
+
+    def _covariance(
+        self, query: Keyframe, match: Keyframe, guess: Guess, T_match_query: FloatArray, fit: Fit, method: str,
+        overlap: float,
+    ) -> FloatArray:  # fmt: skip
+        """Covariance (6, 6) of T_match_query: formal ones of the parts, widened to what ground truth shows."""
+        config = self._config
+        covariance: FloatArray = config.pnp_inflation * guess.covariance
+        if method == "icp":
+            planes = plane_information(query.cloud, match.cloud, T_match_query, fit.pairs)
+            noise = config.icp_inflation * max(fit.rmse, 1e-3) ** 2
+            covariance = np.asarray(np.linalg.inv(np.linalg.inv(covariance) + planes / noise))
+        seen = max(overlap, MIN_SEEN)
+        sigmas = config.sigma_rotation / seen**ROTATION_GROWTH, config.sigma_translation / seen**TRANSLATION_GROWTH
+        floor = np.repeat(sigmas, 3) ** 2
+        covariance = covariance + np.diag(floor)
+        return (covariance + covariance.T) / 2
+
+    def _overlap(self, query: Keyframe, match: Keyframe, T_match_query: FloatArray) -> float:
+        """The smaller of the shares of either cloud that the other one meets."""
+        distance = self._config.overlap_distance
+        there = measure_fit(query.cloud, match.cloud, T_match_query, distance)
+        back = measure_fit(match.cloud, query.cloud, invert(T_match_query), distance)
+        return min(there.fitness, back.fitness)
+
+    def _gate(
+        self, query: Keyframe, match: Keyframe, candidate: LoopCandidate, T_match_query: FloatArray, fit: Fit,
+        overlap: float, covariance: FloatArray,
+    ) -> LoopRejection | None:  # fmt: skip
+        config = self._config
+        filled = max(
+            free_space_violation(query.cloud, match.cloud, match.intrinsics, T_match_query),
+            free_space_violation(match.cloud, query.cloud, query.intrinsics, invert(T_match_query)),
+        )
+        sigma = float(np.sqrt(np.linalg.eigvalsh(covariance[3:, 3:])[-1]))
+        gates = (
+            (fit.fitness >= config.min_fitness, RejectionReason.LOW_FITNESS, fit.fitness, config.min_fitness),
+            (fit.rmse <= config.max_rmse, RejectionReason.HIGH_RMSE, fit.rmse, config.max_rmse),
+            (overlap >= config.min_overlap, RejectionReason.LOW_OVERLAP, overlap, config.min_overlap),
+            (filled <= config.max_free_space, RejectionReason.FREE_SPACE, filled, config.max_free_space),
+            (sigma <= config.max_sigma, RejectionReason.DEGENERATE, sigma, config.max_sigma),
+        )
+        for passed, reason, figure, limit in gates:
+            if not passed:
+                return LoopRejection(candidate, reason, figure, limit)
+        return None
+
+
+def _count(guess: Guess | None) -> int:
+    return 0 if guess is None else len(guess.matches)

@@ -1,0 +1,105 @@
+"""The pinhole camera with Brown distortion: pixels to rays and back."""
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from semslam.errors import ConfigError
+from semslam.geometry.se3 import Float32Array, FloatArray
+
+NO_DISTORTION = (0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Intrinsics:
+    """A pinhole camera.
+
+    Attributes:
+        width: image width in pixels.
+        height: image height in pixels.
+        fx: focal length along u in pixels.
+        fy: focal length along v in pixels.
+        cx: principal point, u in pixels.
+        cy: principal point, v in pixels.
+        distortion: k1, k2, p1, p2, k3 of the Brown model (OpenCV's order).
+        readout: seconds from the exposure of the first row to that of the last (rolling shutter); 0 = all rows at
+            once, None = not known.
+
+    Raises:
+        ConfigError: a size or focal length is not positive, the read-out is negative, or a figure is not finite.
+    """
+
+    width: int
+    height: int
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+    distortion: tuple[float, float, float, float, float] = NO_DISTORTION
+    readout: float | None = None
+
+    def __post_init__(self) -> None:
+        readout = 0.0 if self.readout is None else self.readout
+        figures = (self.fx, self.fy, self.cx, self.cy, *self.distortion, readout)
+        positive = min(self.width, self.height, self.fx, self.fy) > 0 and readout >= 0
+        if not np.isfinite(figures).all() or not positive:
+            raise ConfigError(f"These camera intrinsics are not usable: {self}.")
+
+    @property
+    def matrix(self) -> FloatArray:
+        """The camera matrix K, (3, 3)."""
+        return np.array([[self.fx, 0.0, self.cx], [0.0, self.fy, self.cy], [0.0, 0.0, 1.0]])
+
+    @property
+    def is_distorted(self) -> bool:
+        """Whether any distortion coefficient differs from zero."""
+        return any(self.distortion)
+
+    def undistort_pixels(self, pixels: npt.NDArray[np.floating]) -> Float32Array:
+        """Move raw pixels (N, 2) to where the ideal pinhole would see them, (N, 2) float32."""
+        flat = np.asarray(pixels, dtype=np.float32).reshape(-1, 1, 2)
+        if not self.is_distorted or not len(flat):
+            return flat.reshape(-1, 2)
+        distortion = np.array(self.distortion)
+        moved = cv2.undistortPoints(flat, self.matrix, distortion, P=self.matrix)
+        return np.asarray(moved, dtype=np.float32).reshape(-1, 2)
+
+    def rays(self) -> Float32Array:
+        """Undistorted viewing direction with z = 1 of each raw pixel, (H, W, 2) float32: x and y."""
+        return _rays(self)
+
+    def back_project(self, depth: Float32Array, step: int = 1, offset: int = 0) -> Float32Array:
+        """Points (N, 3) in metres of every ``step``-th pixel, from ``offset`` on, that has depth.
+
+        Args:
+            depth: (H, W) metres, 0 where there is none.
+            step: pixel stride in both directions.
+            offset: the first row and column taken.
+        """
+        z = depth[offset::step, offset::step]
+        seen = z > 0
+        return np.column_stack([self.rays()[offset::step, offset::step][seen] * z[seen, None], z[seen]])
+
+    def project(self, points: npt.NDArray[np.floating]) -> FloatArray:
+        """Ideal (undistorted) pixels (N, 2) of camera-frame points (N, 3); meaningful where z > 0."""
+        return points[:, :2] / points[:, 2:3] * (self.fx, self.fy) + (self.cx, self.cy)
+
+    def scaled(self, factor: float) -> "Intrinsics":
+        """The camera of the same image resized by ``factor``, pixel centres at whole numbers."""
+        return Intrinsics(
+            round(self.width * factor), round(self.height * factor), self.fx * factor, self.fy * factor,
+            (self.cx + 0.5) * factor - 0.5, (self.cy + 0.5) * factor - 0.5, self.distortion, self.readout,
+        )  # fmt: skip
+
+
+@lru_cache(maxsize=8)
+def _rays(camera: Intrinsics) -> Float32Array:
+    u, v = np.meshgrid(np.arange(camera.width), np.arange(camera.height))
+    pixels = camera.undistort_pixels(np.stack([u, v], -1).reshape(-1, 2).astype(np.float32))
+    rays = ((pixels - (camera.cx, camera.cy)) / (camera.fx, camera.fy)).astype(np.float32)
+    rays = rays.reshape(camera.height, camera.width, 2)
+    rays.setflags(write=False)
+    return rays

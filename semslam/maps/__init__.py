@@ -1,0 +1,1 @@
+"""Maps made of keyframes at their optimised poses."""

@@ -1,0 +1,1 @@
+"""A run from its first frame to its folder on disk."""

@@ -1,0 +1,182 @@
+"""A whole run: dataset -> Slam -> RunResult, or recorded motions in the odometry's place; keeps the time."""
+
+import resource
+import time
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from functools import partial
+
+from semslam.config import Config
+from semslam.datasets.dataset import Dataset
+from semslam.datasets.prefetch import prefetch
+from semslam.errors import DatasetError
+from semslam.loop.verification.verification import LoopVerifier
+from semslam.runs.ledger import LedgerEntry
+from semslam.runs.metrics import Metrics, TimeMetrics
+from semslam.runs.recording import RecordedFrame, Recording, checksum
+from semslam.runs.scoring import score_run
+from semslam.runtime.stopwatch import Stopwatch
+from semslam.system.slam import FrameState, Slam, SlamResult
+from semslam.types import Trajectory
+
+Progress = Callable[[int, FrameState | None], None]
+
+
+def _silent(index: int, state: FrameState | None) -> None:
+    """Report nothing."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RunResult:
+    """Everything a run leaves behind.
+
+    Attributes:
+        config: the effective settings.
+        slam: frames, keyframes, loops and graph.
+        odometry: the front end's causal trajectory: tracked frames of its largest map.
+        trajectory: the final trajectory: tracked frames of the largest map.
+        ground_truth: the dataset's, or None.
+        ledger: one entry per loop candidate.
+        metrics: all figures.
+        recording: what the front end made of the sequence, for a replay.
+        notes: what was mended or left out, a sentence each.
+    """
+
+    config: Config
+    slam: SlamResult
+    odometry: Trajectory
+    trajectory: Trajectory
+    ground_truth: Trajectory | None
+    ledger: tuple[LedgerEntry, ...]
+    metrics: Metrics
+    recording: Recording
+    notes: tuple[str, ...]
+
+
+def run(dataset: Dataset, config: Config | None = None, progress: Progress = _silent) -> RunResult:
+    """Run SLAM over a dataset.
+
+    An unreadable image costs its frame, is counted and noted. Ctrl-C ends the sequence early; what was computed
+    until then is optimised, scored and returned with ``metrics.interrupted`` set.
+
+    Args:
+        dataset: the sequence.
+        config: settings; the defaults if None.
+        progress: called after each frame with its index and its state (None if it was unreadable).
+
+    Raises:
+        ConfigError: a name or setting is unknown.
+        ModelError: the network's weights are missing or damaged.
+        DatasetError: no frame at all could be read or tracked.
+    """
+    session = _Session(dataset, config or Config())
+    session.drive(session.track(), progress)
+    return session.result()
+
+
+def replay(
+    dataset: Dataset,
+    recording: Recording,
+    config: Config,
+    progress: Progress = _silent,
+    verifier: LoopVerifier | None = None,
+) -> RunResult:
+    """Repeat detection, verification and back end on a saved front end; images are read at keyframes alone.
+
+    With the settings of the recorded run its trajectory comes out again to the bit.
+
+    Args:
+        dataset: the sequence that was recorded.
+        recording: what the front end made of it; of an interrupted run, the frames until then.
+        config: settings; those of the front end must be the recorded run's (``SavedFrontEnd.check_settings``).
+        progress: called after each frame with its index and its state.
+        verifier: decides on candidates; none = the built-in one.
+
+    Raises:
+        ConfigError: a name or setting is unknown.
+        ModelError: the network's weights are missing or damaged.
+        DatasetError: it is another sequence, or a keyframe's image cannot be read.
+    """
+    recording.check(dataset)
+    session = _Session(dataset, config, verifier)
+    session.drive(session.follow(recording), progress)
+    return session.result()
+
+
+class _Session:
+    """A run between its first frame and its result."""
+
+    def __init__(self, dataset: Dataset, config: Config, verifier: LoopVerifier | None = None) -> None:
+        self._dataset, self._config = dataset, config
+        self._stopwatch, self._clock = Stopwatch(), _Clock()
+        self._slam = Slam.from_config(config, self._stopwatch, verifier)
+        self._unreadable: list[str] = []
+        self._checksum = 0
+        self._interrupted = False
+
+    def track(self) -> Iterator[tuple[int, FrameState | None]]:
+        """Read and track every frame."""
+        for index, item in enumerate(prefetch(self._dataset)):
+            if isinstance(item, DatasetError):
+                self._unreadable.append(str(item))
+                yield index, None
+            else:
+                self._checksum = self._checksum or checksum(item)
+                yield index, self._slam.process(item)
+
+    def follow(self, recording: Recording) -> Iterator[tuple[int, FrameState]]:
+        """Go along recorded motions."""
+        self._unreadable.extend(recording.unreadable)
+        self._checksum, self._interrupted = recording.checksum, recording.interrupted
+        for frame in recording.frames:
+            read = partial(self._dataset.frame, frame.index)
+            yield frame.index, self._slam.follow(frame.index, frame.timestamp, frame.motion, read)
+
+    def drive(self, states: Iterable[tuple[int, FrameState | None]], progress: Progress) -> None:
+        """Take frame after frame until the last, or until Ctrl-C."""
+        try:
+            for index, state in states:
+                progress(index, state)
+        except KeyboardInterrupt:
+            self._interrupted = True
+
+    def result(self) -> RunResult:
+        """Optimise, score and join what was found."""
+        if not self._slam.keyframes:
+            raise DatasetError((*self._unreadable, f"No frame of {self._dataset.name} could be tracked.")[0])
+        slam = self._slam.finish()
+        times = self._clock.read(len(slam.frames), self._stopwatch)
+        scores = score_run(self._dataset, self._config, slam, len(self._unreadable), self._interrupted, times)
+        return RunResult(
+            config=self._config,
+            slam=slam,
+            odometry=scores.odometry,
+            trajectory=scores.trajectory,
+            ground_truth=self._dataset.ground_truth,
+            ledger=scores.ledger,
+            metrics=scores.metrics,
+            recording=Recording(
+                tuple(RecordedFrame(state.index, state.timestamp, state.motion) for state in slam.frames),
+                tuple(self._unreadable),
+                self._interrupted,
+                self._checksum,
+            ),
+            notes=(*self._dataset.notes, *self._unreadable, *slam.notes),
+        )
+
+
+class _Clock:
+    """Wall time, processor time and peak memory of a run."""
+
+    def __init__(self) -> None:
+        self._wall, self._cpu = time.perf_counter(), time.process_time()
+
+    def read(self, frames: int, stopwatch: Stopwatch) -> TimeMetrics:
+        wall = time.perf_counter() - self._wall
+        return TimeMetrics(
+            wall_s=round(wall, 3),
+            fps=round(frames / wall, 2),
+            cpu_s=round(time.process_time() - self._cpu, 3),
+            peak_mb=round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0, 1),
+            stages_ms=stopwatch.medians_ms(),
+        )

@@ -1,0 +1,203 @@
+"""A front end's work, saved: with it detection, verification and back end can be repeated without tracking again."""
+
+import zipfile
+import zlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from semslam.config import Config, load_saved_config
+from semslam.datasets.dataset import Dataset
+from semslam.errors import ConfigError, DatasetError, ResultsError
+from semslam.geometry.se3 import is_rigid
+from semslam.types import Frame, Motion, Observations, TrackingStatus
+
+Arrays = dict[str, npt.NDArray[Any]]
+RECORDING, SOURCE = "frontend.npz", "sequence.txt"
+
+FIXED: dict[str, Any] = {
+    "odometry": True,
+    "dataset": True,
+    "feature": True,
+    "feature_map": True,
+    "dense": True,
+    "kiss": True,
+    "keyframes": {"interval": True, "max_translation": True, "max_rotation": True},
+}
+"""Settings that a replay cannot change: they decide the motions and which frames are keyframes."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RecordedFrame:
+    """A frame's place in the sequence, its stamp in seconds and what the odometry said of it."""
+
+    index: int
+    timestamp: float
+    motion: Motion
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Recording:
+    """What the front end made of a sequence.
+
+    Attributes:
+        frames: every frame the odometry was shown; landmarks are kept of keyframes alone.
+        unreadable: what was said of each frame that could not be read.
+        interrupted: whether the run was stopped before the last frame.
+        checksum: of the first frame's images, by which the sequence is known again.
+    """
+
+    frames: tuple[RecordedFrame, ...]
+    unreadable: tuple[str, ...]
+    interrupted: bool
+    checksum: int
+
+    def check(self, dataset: Dataset) -> None:
+        """Make sure that a dataset is the sequence that was recorded.
+
+        Raises:
+            DatasetError: it is another one, or its first image cannot be read.
+        """
+        stamps = dataset.timestamps
+        for frame in self.frames:
+            if frame.index >= len(stamps) or stamps[frame.index] != frame.timestamp:
+                raise DatasetError(f"{dataset.name} is not the sequence of the saved run: frame {frame.index} differs.")
+        first = self.frames[0].index
+        if checksum(dataset.frame(first)) != self.checksum:
+            raise DatasetError(f"{dataset.name} is not the sequence of the saved run: image {first} differs.")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SavedFrontEnd:
+    """What a replay needs of a run folder.
+
+    Attributes:
+        config: the settings it ran with.
+        recording: what its front end made of the sequence.
+        source: what the sequence was opened by, or None.
+    """
+
+    config: Config
+    recording: Recording
+    source: str | None
+
+    def check_settings(self, wanted: Config) -> None:
+        """Make sure that settings ask for nothing that only tracking anew could give.
+
+        Raises:
+            ConfigError: a setting of the front end differs.
+        """
+        before, after = (config.model_dump(include=FIXED) for config in (self.config, wanted))
+        changed = [name for name in FIXED if before[name] != after[name]]
+        if changed:
+            raise ConfigError(f"'{changed[0]}' decides the front end, which a replay takes from the saved run.")
+
+
+def checksum(frame: Frame) -> int:
+    """CRC-32 of a frame's colour and depth."""
+    return zlib.crc32(frame.depth.tobytes(), zlib.crc32(frame.color.tobytes()))
+
+
+def write_recording(directory: Path, recording: Recording, source: str | None = None) -> None:
+    """Write a recording, and what the sequence was opened by, into a run folder; the same one gives the same bytes."""
+    if source is not None:
+        place = Path(source).resolve() if Path(source).exists() else source
+        (directory / SOURCE).write_text(f"{place}\n", encoding="utf-8")
+    motions = [frame.motion for frame in recording.frames]
+    seen = [motion.observations for motion in motions if motion.observations is not None]
+    np.savez_compressed(
+        directory / RECORDING,
+        unreadable=np.array(recording.unreadable, dtype=np.str_),
+        interrupted=np.array(recording.interrupted),
+        checksum=np.array(recording.checksum, dtype=np.uint32),
+        index=np.array([frame.index for frame in recording.frames], dtype=np.int64),
+        timestamp=np.array([frame.timestamp for frame in recording.frames]),
+        T_prev_cur=np.array([motion.T_prev_cur for motion in motions]).reshape(-1, 4, 4),
+        covariance=np.array([motion.covariance for motion in motions]).reshape(-1, 6, 6),
+        status=np.array([motion.status.value for motion in motions], dtype=np.str_),
+        map_id=np.array([motion.map_id for motion in motions], dtype=np.int64),
+        inliers=np.array([motion.inliers for motion in motions], dtype=np.int64),
+        observed=np.array([-1 if m.observations is None else len(m.observations.landmarks) for m in motions]),
+        landmarks=_joined([o.landmarks for o in seen], np.int64, ()),
+        pixels=_joined([o.pixels for o in seen], np.float32, (2,)),
+        depths=_joined([o.depths for o in seen], np.float32, ()),
+        sigmas=_joined([np.ones_like(o.depths) if o.sigmas is None else o.sigmas for o in seen], np.float32, ()),
+    )
+
+
+def read_front_end(directory: Path) -> SavedFrontEnd:
+    """Read of a run folder what a replay needs.
+
+    Raises:
+        ResultsError: it is no run folder, was written by an earlier version, or its recording is damaged.
+        ConfigError: its settings cannot be read.
+    """
+    recording, source = read_recording(directory), directory / SOURCE
+    try:
+        named = source.read_text(encoding="utf-8").strip() if source.exists() else None
+    except (OSError, UnicodeDecodeError) as error:
+        raise ResultsError(f"{source} cannot be read.") from error
+    return SavedFrontEnd(load_saved_config(directory / "config.yaml"), recording, named)
+
+
+def read_recording(directory: Path) -> Recording:
+    """Read what ``write_recording`` wrote into a folder.
+
+    Raises:
+        ResultsError: there is no recording, or it is damaged.
+    """
+    path = directory / RECORDING
+    if not path.is_file():
+        raise ResultsError(f"{directory} cannot be replayed: it has no {RECORDING}.")
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            arrays = {name: file[name] for name in file.files}
+        return Recording(
+            frames=_frames(arrays),
+            unreadable=tuple(str(text) for text in arrays["unreadable"]),
+            interrupted=bool(arrays["interrupted"]),
+            checksum=int(arrays["checksum"]),
+        )
+    except KeyError as error:
+        raise ResultsError(f"The saved front end in {directory} was written by another version.") from error
+    except (OSError, EOFError, IndexError, TypeError, ValueError, zipfile.BadZipFile, zlib.error) as error:
+        raise ResultsError(f"The saved front end in {directory} is damaged.") from error
+
+
+def _frames(arrays: Arrays) -> tuple[RecordedFrame, ...]:
+    """The frames; a ValueError says that the arrays do not go together."""
+    count = len(arrays["index"])
+    poses, covariances, stamps = arrays["T_prev_cur"], arrays["covariance"], arrays["timestamp"]
+    if count == 0 or poses.shape != (count, 4, 4) or covariances.shape != (count, 6, 6) or not is_rigid(poses):
+        raise ValueError("no motions")
+    if not (np.isfinite(covariances).all() and (np.diff(stamps) > 0).all() and (np.diff(arrays["index"]) > 0).all()):
+        raise ValueError("figures out of order")
+    observations = _observations(arrays)
+    columns = (arrays[name].tolist() for name in ("index", "timestamp", "status", "map_id", "inliers"))
+    return tuple(
+        RecordedFrame(index, stamp, Motion(T, covariance, TrackingStatus(status), map_id, inliers, seen))
+        for index, stamp, status, map_id, inliers, T, covariance, seen in zip(
+            *columns, poses, covariances, observations, strict=True
+        )
+    )
+
+
+def _observations(arrays: Arrays) -> list[Observations | None]:
+    """What each frame saw; None where the odometry kept nothing of it."""
+    counts = arrays["observed"]
+    ends = np.cumsum(counts.clip(0))
+    columns = [arrays[name] for name in ("landmarks", "pixels", "depths", "sigmas")]
+    if any(len(column) != ends[-1] for column in columns):
+        raise ValueError("landmarks are missing")
+    return [
+        None if count < 0 else Observations(*(column[end - count : end] for column in columns))
+        for count, end in zip(counts.tolist(), ends.tolist(), strict=True)
+    ]
+
+
+def _joined(parts: Sequence[npt.NDArray[Any]], dtype: Any, shape: tuple[int, ...]) -> npt.NDArray[Any]:
+    return np.concatenate(parts) if parts else np.zeros((0, *shape), dtype=dtype)

@@ -1,0 +1,150 @@
+"""A finished run against ground truth: trajectories, loops, figures."""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from semslam.backend.graph.products import LoopVerdict
+from semslam.config import BackendConfig, Config
+from semslam.datasets.dataset import Dataset
+from semslam.errors import TrajectoryError
+from semslam.eval.loops.truth import JudgedLoop, LoopJudgement, judge_loops
+from semslam.eval.trajectory import TrajectoryScore, coverage, score_trajectory
+from semslam.runs.contributions import loop_contributions
+from semslam.runs.ledger import GraphVerdict, LedgerEntry, LoopContribution, Verdict, rejected_entry, verified_entry
+from semslam.runs.metrics import LoopMetrics, Metrics, TimeMetrics, TrajectoryMetrics
+from semslam.system.slam import FrameState, SlamResult
+from semslam.types import LoopConstraint, RejectionReason, TrackingStatus, Trajectory
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scores:
+    """What scoring makes of a run.
+
+    Attributes:
+        odometry: causal trajectory, tracked frames of the odometry's largest map.
+        trajectory: final trajectory, tracked frames of the largest map.
+        ledger: one entry per candidate.
+        metrics: all figures.
+    """
+
+    odometry: Trajectory
+    trajectory: Trajectory
+    ledger: tuple[LedgerEntry, ...]
+    metrics: Metrics
+
+
+def score_run(
+    dataset: Dataset, config: Config, slam: SlamResult, unreadable: int, interrupted: bool, time: TimeMetrics
+) -> Scores:
+    """Score a run; without ground truth, or where it meets fewer than three poses, the errors are None."""
+    truth = dataset.ground_truth
+    odometry, trajectory = _trajectories(slam)
+    ledger = _ledger(dataset, slam, config)
+    stamps = [state.timestamp for state in slam.frames]
+    metrics = Metrics(
+        sequence=dataset.name,
+        detector=config.detector,
+        odometry=config.odometry,
+        seed=config.seed,
+        frames=len(slam.frames) + unreadable,
+        unreadable=unreadable,
+        tracked=len(trajectory),
+        lost_intervals=lost_intervals(slam.frames),
+        keyframes=len(slam.keyframes),
+        ground_truth_coverage=None if truth is None else coverage(stamps, truth),
+        odometry_only=TrajectoryMetrics.from_score(_score(odometry, truth)),
+        optimized=TrajectoryMetrics.from_score(_score(trajectory, truth)),
+        maps=len(slam.solution.components),
+        loops=_loop_metrics(slam, ledger, truth is not None),
+        time=time,
+        interrupted=interrupted,
+    )
+    return Scores(odometry, trajectory, ledger, metrics)
+
+
+def lost_intervals(frames: Sequence[FrameState]) -> list[tuple[float, float]]:
+    """First and last stamp, in seconds, of each run of lost frames."""
+    intervals: list[tuple[float, float]] = []
+    was_lost = False
+    for state in frames:
+        is_lost = state.status is TrackingStatus.LOST
+        if is_lost and was_lost:
+            intervals[-1] = (intervals[-1][0], state.timestamp)
+        elif is_lost:
+            intervals.append((state.timestamp, state.timestamp))
+        was_lost = is_lost
+    return intervals
+
+
+def _trajectories(slam: SlamResult) -> tuple[Trajectory, Trajectory]:
+    tracked = np.array([state.status is not TrackingStatus.LOST for state in slam.frames])
+    stamps = np.array([state.timestamp for state in slam.frames])
+    map_ids = np.array([state.map_id for state in slam.frames])
+    largest_map = np.bincount(map_ids[tracked]).argmax()
+    causal = np.array([state.T_odom_cam for state in slam.frames])
+    in_odometry = tracked & (map_ids == largest_map)
+    in_final = tracked & (np.array(slam.components) == 0)
+    return (
+        Trajectory(stamps[in_odometry], causal[in_odometry]),
+        Trajectory(stamps[in_final], slam.poses[in_final]),
+    )
+
+
+def _score(estimate: Trajectory, truth: Trajectory | None) -> TrajectoryScore | None:
+    if truth is None:
+        return None
+    try:
+        return score_trajectory(estimate, truth)
+    except TrajectoryError:
+        return None
+
+
+def _ledger(dataset: Dataset, slam: SlamResult, config: Config) -> tuple[LedgerEntry, ...]:
+    contributions = loop_contributions(slam.solution, slam.keyframes, dataset.ground_truth, config.backend)
+    verdicts = iter(zip(slam.solution.verdicts, _truths(dataset, slam), contributions, strict=True))
+    entries = []
+    for outcome in slam.outcomes:
+        if isinstance(outcome, LoopConstraint):
+            verdict, truth, contribution = next(verdicts)
+            entries.append(
+                verified_entry(outcome, slam.keyframes, _graph_verdict(verdict, contribution, config.backend), truth)
+            )
+        else:
+            entries.append(rejected_entry(outcome, slam.keyframes))
+    return tuple(entries)
+
+
+def _graph_verdict(verdict: LoopVerdict, contribution: LoopContribution | None, config: BackendConfig) -> GraphVerdict:
+    """The verdict with the figure that failed; an ambiguous loop fails against other loops, by no figure of its own."""
+    figure, limit = None, None
+    if verdict.reason is RejectionReason.OUTLIER:
+        figure, limit = verdict.residual, config.max_residual
+    elif verdict.reason is RejectionReason.INCONSISTENT:
+        figure, limit = verdict.drift, config.drift_slack * config.max_residual
+    reason = None if verdict.reason is None else verdict.reason.value
+    return GraphVerdict(verdict.weight, verdict.accepted, contribution, reason, figure, limit)
+
+
+def _truths(dataset: Dataset, slam: SlamResult) -> Sequence[JudgedLoop | None]:
+    """Each verified loop against ground truth."""
+    loops = [verdict.constraint for verdict in slam.solution.verdicts]
+    if dataset.ground_truth is None:
+        return [None] * len(loops)
+    return judge_loops(loops, slam.keyframes, dataset.ground_truth, lambda index: dataset.frame(index).depth)
+
+
+def _loop_metrics(slam: SlamResult, ledger: Sequence[LedgerEntry], truth_is_known: bool) -> LoopMetrics:
+    accepted = [entry for entry in ledger if entry.verdict is Verdict.ACCEPTED]
+    kinds = Counter(entry.truth.judgement for entry in accepted if entry.truth is not None)
+    known = truth_is_known and (not accepted or bool(kinds))
+    return LoopMetrics(
+        proposed=len(slam.outcomes),
+        verified=len(slam.solution.verdicts),
+        accepted=len(accepted),
+        true=kinds[LoopJudgement.TRUE] if known else None,
+        inaccurate=kinds[LoopJudgement.INACCURATE] if known else None,
+        false=kinds[LoopJudgement.FALSE] if known else None,
+    )

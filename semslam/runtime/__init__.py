@@ -1,0 +1,1 @@
+"""Threads and stage times."""

@@ -1,0 +1,1 @@
+"""The SLAM algorithm and its embedding in other programs."""

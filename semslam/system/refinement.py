@@ -1,0 +1,63 @@
+"""The last step of a run: keyframes moved so that the points which several of them see fall into place."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from itertools import pairwise
+
+from semslam.backend.bundle.bundle import adjust
+from semslam.backend.bundle.tracks import MatchedFeatures, join_tracks
+from semslam.backend.pose_graph import Edge, GraphSolution
+from semslam.backend.robust.repetition import discounted
+from semslam.config import Config
+from semslam.loop.verification.neighbours import shared_features
+from semslam.types import Keyframe, Observations
+
+SEEN_TWICE = {"min_views": 2}
+"""Features that closures share are no part of odometry, so that two views of one already say something new."""
+
+
+def refine(
+    solution: GraphSolution, keyframes: Sequence[Keyframe], observations: Mapping[int, Observations], config: Config
+) -> GraphSolution:
+    """The solution with its poses after bundle adjustment.
+
+    The landmarks are those that the odometry keeps. One that keeps none, such as ICP, gets them from its closures:
+    the features on which the accepted loops rest, and those that a keyframe shares with the one before it. Without
+    an accepted loop its poses stay as they are.
+
+    Args:
+        solution: the optimised graph.
+        keyframes: ``keyframes[i].id`` is i.
+        observations: landmarks that the odometry saw, by keyframe; may be empty.
+        config: its sections ``backend`` and ``verification``, and the seed.
+
+    Raises:
+        GraphError: the optimiser failed.
+    """
+    settings = config.backend.bundle
+    loops: Sequence[Edge] = solution.loops
+    if observations:
+        # A map that keeps landmarks has tied old keyframes to new ones already, and each loop says much of the same.
+        loops = discounted(loops)
+    elif settings.rounds and settings.closures and loops:
+        observations = _shared(solution, keyframes, config)
+        settings = settings.model_copy(update=SEEN_TWICE)
+    else:
+        return solution
+    edges = (*solution.odometry, *loops, *solution.covisible)
+    result = adjust(solution.poses, observations, keyframes[0].intrinsics, settings, edges)
+    return replace(solution, poses=result.poses)
+
+
+def _shared(solution: GraphSolution, keyframes: Sequence[Keyframe], config: Config) -> dict[int, Observations]:
+    pairs = []
+    for verdict in solution.verdicts:
+        loop = verdict.constraint
+        if verdict.accepted and loop.shared is not None:
+            pairs.append(MatchedFeatures(loop.candidate.query, loop.candidate.match, loop.shared))
+    for before, after in pairwise(keyframes):
+        if before.map_id == after.map_id:
+            rows = shared_features(after, before, config.verification, config.seed)
+            if rows is not None:
+                pairs.append(MatchedFeatures(after.id, before.id, rows))
+    return join_tracks({keyframe.id: keyframe.finest for keyframe in keyframes}, pairs)

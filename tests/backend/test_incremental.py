@@ -1,0 +1,182 @@
+"""The incremental graph against the batch one, on rings whose truth is exact."""
+
+from pathlib import Path
+
+import gtsam
+import numpy as np
+import pytest
+
+from semslam.backend.analysis.judge import constraint_of, judge_graph, split_edges
+from semslam.backend.analysis.simulation import measure, measure_odometry, ring
+from semslam.backend.analysis.stress import FalseLoopKind, false_loops
+from semslam.backend.graph.g2o import read_g2o
+from semslam.backend.graph.products import PosedGraph
+from semslam.backend.incremental import IncrementalPoseGraph
+from semslam.backend.pose_graph import PoseGraph
+from semslam.config import BackendConfig
+from semslam.errors import GraphError
+from semslam.geometry.se3 import compose, exp_so3, make_transform
+
+
+def simulated(count=80, seed=0, loops_every=3, scale=1.0):
+    truth, rng = ring(count), np.random.default_rng(seed)
+    lap = count // 2
+    odometry = measure_odometry(truth, rng, scale)
+    return truth, odometry, measure(truth, [(k, k + lap) for k in range(0, lap, loops_every)], rng)
+
+
+def replay(odometry, loops, config=None, after_each=lambda graph, key: None):
+    """Feed keyframe after keyframe, each with the loops that end at it."""
+    graph = IncrementalPoseGraph(config)
+    T = compose([edge.T_from_to for edge in odometry], np.eye(4))
+    graph.add_keyframe(0, T[0])
+    graph.update()
+    for edge in odometry:
+        graph.add_keyframe(edge.to_key, T[edge.to_key])
+        graph.add_odometry(edge.from_key, edge.to_key, edge.T_from_to, edge.covariance)
+        for loop in loops:
+            if loop.to_key == edge.to_key:
+                graph.add_loop(constraint_of(loop))
+        graph.update()
+        after_each(graph, edge.to_key)
+    return graph
+
+
+def batch(odometry, loops, config=None):
+    graph = PoseGraph(config)
+    for key, T in enumerate(compose([edge.T_from_to for edge in odometry], np.eye(4))):
+        graph.add_keyframe(key, T)
+    for edge in odometry:
+        graph.add_odometry(edge.from_key, edge.to_key, edge.T_from_to, edge.covariance)
+    for loop in loops:
+        graph.add_loop(constraint_of(loop))
+    return graph.optimize()
+
+
+def apart(one, other):
+    return max(float(np.linalg.norm(one[key][:3, 3] - other[key][:3, 3])) for key in other)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_clean_graph_agrees_with_batch_within_millimetres(seed):
+    _, odometry, loops = simulated(seed=seed)
+    graph = replay(odometry, loops)
+    assert len(graph.accepted) >= len(loops) - 1
+    kept = [loop for loop in loops if (loop.from_key, loop.to_key) in graph.accepted]
+    assert apart(graph.poses(), batch(odometry, kept, BackendConfig(robust="none", max_odometry_scale=1)).poses) < 2e-3
+
+
+def test_a_loop_shows_at_once():
+    truth, odometry, loops = simulated(seed=1)
+    errors = {}
+
+    def note(graph, key):
+        place = graph.pose(key)[:3, 3] - (np.linalg.inv(truth[0]) @ truth[key])[:3, 3]
+        errors[key] = float(np.linalg.norm(place))
+
+    replay(odometry, loops[:1], after_each=note)
+    first = loops[0].to_key
+    assert errors[first] < 0.5 * errors[first - 1]
+
+
+def test_one_outlier_can_be_removed():
+    _, odometry, loops = simulated(seed=2)
+    trusting = BackendConfig(max_residual=1e6)
+    graph, clean = replay(odometry, loops, trusting), replay(odometry, loops, trusting)
+    T_wrong = make_transform(exp_so3([0, 0, 0.3]), [0.5, 0.5, 0.0])
+    graph.add_loop(constraint_of(replace_pose(loops[0], 3, 70, T_wrong)))
+    graph.update()
+    assert apart(graph.poses(), clean.poses()) > 0.05
+    graph.remove_loop(3, 70)
+    assert apart(graph.poses(), clean.poses()) < 2e-3
+    with pytest.raises(GraphError, match="no loop"):
+        graph.remove_loop(3, 70)
+
+
+def replace_pose(edge, from_key, to_key, T):
+    return type(edge)(from_key, to_key, T, edge.covariance)
+
+
+@pytest.mark.parametrize("kind", FalseLoopKind)
+def test_false_loops_wait_and_bar_nobody(kind):
+    truth, odometry, loops = simulated(seed=3, count=100, loops_every=2)
+    false = false_loops(PosedGraph(dict(enumerate(truth)), (*odometry, *loops)), 11, kind, 0)
+    graph = replay(odometry, [*loops, *false])
+    graph.optimize()
+    wrong = {(edge.from_key, edge.to_key) for edge in false}
+    assert not wrong & set(graph.accepted)
+    assert len(set(graph.accepted) - wrong) >= 0.9 * len(loops)
+    assert set(graph.accepted) | set(graph.waiting) == wrong | {(e.from_key, e.to_key) for e in loops}
+
+
+def test_a_false_loop_that_came_first_is_found_out_by_those_that_follow():
+    _, odometry, loops = simulated(seed=4, count=100, loops_every=2)
+    shift = make_transform(np.eye(3), [0.15, 0.1, 0.0])  # small enough to pass for drift
+    first = replace_pose(loops[0], 0, 50, loops[0].T_from_to @ shift)
+    rest = loops[1:]
+    graph = replay(odometry, [first, *rest])
+    graph.optimize()
+    assert (0, 50) not in graph.accepted
+    assert len(graph.accepted) >= 0.9 * len(rest)
+
+
+def test_odometry_that_is_too_sure_of_itself_is_widened_on_the_way():
+    _, odometry, loops = simulated(seed=5, count=100, loops_every=2, scale=6.0)
+    graph = replay(odometry, loops)
+    assert len(graph.accepted) >= 0.8 * len(loops)
+
+
+def test_two_maps_are_joined():
+    truth, odometry, loops = simulated(40, loops_every=2)
+    elsewhere = make_transform(exp_so3([0.4, 1.0, -2.0]), [20.0, 5.0, -3.0])
+    graph = IncrementalPoseGraph()
+    for key, T in enumerate(truth):
+        graph.add_keyframe(key, T if key < 20 else elsewhere @ T)
+        if key not in (0, 20):
+            edge = odometry[key - 1]
+            graph.add_odometry(edge.from_key, edge.to_key, edge.T_from_to, edge.covariance)
+        for loop in loops:
+            if loop.to_key == key:
+                graph.add_loop(constraint_of(loop))
+        graph.update()
+    assert len(graph.accepted) == len(loops)
+    assert apart(graph.poses(), dict(enumerate(truth))) < 0.1
+
+
+def test_the_same_run_gives_the_same_bytes():
+    _, odometry, loops = simulated(seed=6)
+    one, other = replay(odometry, loops).poses(), replay(odometry, loops).poses()
+    assert all((one[key] == other[key]).all() for key in one)
+
+
+def test_wrong_input_leaves_the_graph_usable():
+    _, odometry, loops = simulated(seed=7)
+    graph = replay(odometry, loops)
+    before = graph.poses()
+    with pytest.raises(GraphError):
+        graph.add_keyframe(500, np.full((4, 4), np.nan))
+    with pytest.raises(GraphError):
+        graph.add_odometry(0, 900, np.eye(4), np.eye(6))
+    with pytest.raises(GraphError):
+        graph.add_loop(constraint_of(loops[0]))
+    graph.update()
+    assert apart(graph.poses(), before) < 1e-3
+
+
+@pytest.mark.parametrize("name", ["pose3example", "pose3example-grid.txt"])
+def test_gtsams_graphs_cost_the_same_incrementally(name):
+    graph = read_g2o(Path(gtsam.findExampleDataFile(name)))
+    odometry, loops = split_edges(graph)
+    config = BackendConfig(robust="none", max_residual=1e6)
+    incremental = IncrementalPoseGraph(config)
+    for key, T in sorted(graph.poses.items()):
+        incremental.add_keyframe(key, T)
+        for edge in odometry:
+            if max(edge.from_key, edge.to_key) == key:
+                incremental.add_odometry(edge.from_key, edge.to_key, edge.T_from_to, edge.covariance)
+        for loop in loops:
+            if max(loop.from_key, loop.to_key) == key:
+                incremental.add_loop(constraint_of(loop))
+        incremental.update()
+    reached = judge_graph(PosedGraph(incremental.poses(), graph.edges), config.model_copy(update={"max_iterations": 1}))
+    assert reached.cost == pytest.approx(judge_graph(graph, config).cost, rel=1e-3, abs=1e-6)

@@ -1,0 +1,273 @@
+"""Training on a tiny made-up folder: it learns, survives a kill, and scores are right."""
+
+import cv2
+import numpy as np
+import pytest
+import torch
+from hypothesis import given
+from hypothesis import strategies as st
+
+from semslam.config import load_config
+from semslam.errors import ConfigError, DatasetError, ModelError
+from semslam.loop.segmentation.build import build_segmenter
+from semslam.loop.segmentation.network.averaging import average
+from semslam.loop.segmentation.network.checkpoint import SHIPPED, read_tensors, save_weights
+from semslam.loop.segmentation.network.network import build_mobilenet_deeplab
+from semslam.loop.segmentation.photos import Photo, read_photo
+from semslam.loop.segmentation.segmenters.onnx import load_graph
+from semslam.loop.segmentation.training.augmentation import paste_patch, random_view
+from semslam.loop.segmentation.training.evaluation import confusion_matrix, evaluate, score
+from semslam.loop.segmentation.training.self_training import Teacher, teach
+from semslam.loop.segmentation.training.training import (
+    class_weights,
+    learning_rate,
+    photos_by_class,
+    soft_cross_entropy,
+    train,
+)
+from semslam.loop.segmentation.training.training_log import read_log
+
+SIZE = {"width": 64, "height": 48}
+
+
+@pytest.fixture
+def rooms(tmp_path):
+    """Six photos with a grey wall (1) above a brown floor (2)."""
+    folder = tmp_path / "rooms"
+    for part in ("rgb", "labels40"):
+        (folder / part).mkdir(parents=True)
+    rng = np.random.default_rng(0)
+    for i in range(6):
+        horizon = int(rng.integers(30, 70))
+        labels = np.where(np.arange(96)[:, None] < horizon, 1, 2).repeat(128, 1).astype(np.uint8)
+        color = np.where(labels[..., None] == 1, (200, 200, 200), (40, 80, 140)) + rng.integers(-20, 20, (96, 128, 3))
+        cv2.imwrite(str(folder / "rgb" / f"{i}.png"), color.astype(np.uint8))
+        cv2.imwrite(str(folder / "labels40" / f"{i}.png"), labels)
+    (folder / "train.txt").write_text("0\n1\n2\n3\n")
+    (folder / "val.txt").write_text("4\n5\n")
+    return folder
+
+
+def settings(seed=0, **training):
+    values = {"epochs": 2, "batch": 2, "save_every": 1e-9, "average": 0.5, **training}
+    return load_config(overrides={"seed": seed, "training": values, "segmentation": SIZE})
+
+
+class KilledError(Exception):
+    pass
+
+
+def kill_at_third(progress):
+    if progress.step == 3:
+        raise KilledError
+
+
+def test_resumed_training_ends_with_the_same_weights(rooms, tmp_path):
+    whole = read_tensors(train(rooms, settings(), tmp_path / "whole"))
+
+    with pytest.raises(KilledError):
+        train(rooms, settings(), tmp_path / "torn", kill_at_third)
+    steps = []
+    torn = read_tensors(train(rooms, settings(), tmp_path / "torn", lambda p: steps.append(p.step)))
+    assert steps == [3, 4]
+    assert all(torch.equal(whole[name], torn[name]) for name in whole)
+
+
+def test_training_learns_and_its_outputs_serve(rooms, tmp_path):
+    losses = []
+    out = tmp_path / "run"
+    weights = train(
+        rooms, settings(epochs=20, start=str(SHIPPED), freeze_norms=True), out, lambda p: losses.append(p.loss)
+    )
+    assert np.mean(losses[-4:]) < 0.7 * np.mean(losses[:4])
+    assert [row[0] for row in read_log(out / "training.csv")] == [20, 40]
+    assert (out / "training.png").stat().st_size > 1000
+    for path in (weights, out / "weights.onnx"):
+        config = load_config(overrides={"segmentation": {**SIZE, "weights": str(path)}})
+        result = evaluate(build_segmenter(config), rooms, size=None)
+        assert result.pixel_accuracy > 0.8
+        assert result.per_class_iou["chair"] is None
+
+
+def test_damaged_state_is_one_sentence(rooms, tmp_path):
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "state.pt").write_bytes(b"torn")
+    with pytest.raises(ModelError, match="state"):
+        train(rooms, settings(), tmp_path / "run")
+
+
+def test_other_settings_do_not_resume(rooms, tmp_path):
+    with pytest.raises(KilledError):
+        train(rooms, settings(), tmp_path / "run", kill_at_third)
+    with pytest.raises(ModelError, match="other settings"):
+        train(rooms, settings(epochs=3), tmp_path / "run")
+
+
+def test_teacher_tells_what_it_believes(rooms, tmp_path):
+    teacher = Teacher([load_graph(None, "int8")], sizes=((64, 48), (96, 64)))
+    probabilities = teacher.probabilities(read_photo(rooms, "0").color)
+    assert probabilities.shape == (16, 24, 40)
+    np.testing.assert_allclose(probabilities.sum(axis=2), 1.0, atol=1e-5)
+    photo = teach(teacher, rooms / "rgb", tmp_path / "taught")[0]
+    assert photo.beliefs.shape == (1 + 16 * 24, 40)
+    assert not photo.beliefs[0].any()
+    under_first_column = photo.beliefs[photo.cells[3::6, 2]] / 255.0
+    np.testing.assert_allclose(under_first_column, probabilities[:, 0], atol=0.01)
+
+
+def test_training_asks_teachers_once(rooms, tmp_path):
+    taught = settings(epochs=1, unlabelled=str(rooms / "rgb"), teachers=[str(SHIPPED)], unlabelled_share=0.9)
+    assert train(rooms, taught, tmp_path / "run").exists()
+    kept = sorted((tmp_path / "run" / "taught").iterdir())
+    assert [path.name for path in kept] == [f"{i}.npy" for i in range(6)]
+    with pytest.raises(ConfigError, match="needs both"):
+        train(rooms, settings(unlabelled=str(rooms / "rgb")), tmp_path / "other")
+
+
+def test_soft_cross_entropy_of_labels_is_the_weighted_one():
+    rng = np.random.default_rng(0)
+    logits = torch.from_numpy(rng.normal(size=(2, 40, 3, 4)))
+    labels = torch.from_numpy(rng.integers(0, 40, (2, 3, 4)))
+    weights = torch.from_numpy(rng.uniform(0.3, 4.0, 40))
+    targets = (torch.nn.functional.one_hot(labels, 40) * weights).permute(0, 3, 1, 2)
+    expected = torch.nn.functional.cross_entropy(logits, labels, weight=weights)
+    torch.testing.assert_close(soft_cross_entropy(logits, targets), expected)
+    assert soft_cross_entropy(logits, torch.zeros_like(targets)) == 0
+
+
+@pytest.mark.parametrize(
+    ("damage", "word"),
+    [
+        (lambda d: (d / "train.txt").unlink(), "no list"),
+        (lambda d: (d / "train.txt").write_text(""), "empty"),
+        (lambda d: (d / "rgb" / "1.png").unlink(), "missing"),
+        (lambda d: (d / "labels40" / "1.png").write_bytes(b"torn"), "missing or not"),
+        (lambda d: cv2.imwrite(str(d / "labels40" / "1.png"), np.zeros((5, 5), np.uint8)), "another size"),
+        (lambda d: cv2.imwrite(str(d / "labels40" / "1.png"), np.full((96, 128), 41, np.uint8)), "beyond 40"),
+    ],
+)
+def test_faulty_folder_is_one_sentence(rooms, tmp_path, damage, word):
+    damage(rooms)
+    with pytest.raises(DatasetError, match=word):
+        train(rooms, settings(), tmp_path / "run")
+
+
+def test_views_are_drawn_from_the_seed(rooms):
+    photo = read_photo(rooms, "0")
+    a, b, c = (random_view(photo.color, photo.labels, (64, 48), np.random.default_rng(seed)) for seed in (1, 1, 2))
+    assert np.array_equal(a[0], b[0])
+    assert np.array_equal(a[1], b[1])
+    assert not np.array_equal(a[0], c[0])
+
+
+@pytest.mark.parametrize("strong_share", [0.0, 1.0])
+def test_views_keep_labels_on_their_pixels(strong_share):
+    """Where the view shows bright it must say 2, where dark 1, whatever the zoom, turn and mirroring."""
+    labels = np.ones((96, 128), np.uint8)
+    labels[:, 64:] = 2
+    color = np.where(labels[..., None] == 2, 230, 20).repeat(3, 2).astype(np.uint8)
+    for seed in range(40):
+        view, drawn = random_view(color, labels, (64, 48), np.random.default_rng(seed), strong_share)
+        assert view.shape == (48, 64, 3)
+        inner = cv2.erode((drawn == 2).astype(np.uint8), np.ones((15, 15))) > 0
+        outer = cv2.erode((drawn == 1).astype(np.uint8), np.ones((15, 15))) > 0
+        if inner.any() and outer.any():
+            assert view[inner].mean() > view[outer].mean() + 40
+
+
+@given(st.integers(1, 60), st.integers(1, 80), st.integers(0, 10_000))
+def test_a_patch_brings_its_targets_along(height, width, seed):
+    views = [np.full((4 * height, 4 * width, 3), level, np.uint8) for level in (20, 230)]
+    targets = [np.full((height, width, 2), level, np.float32) for level in (20, 230)]
+    paste_patch(views[0], targets[0], views[1], targets[1], np.random.default_rng(seed))
+    assert (views[1] == 230).all()
+    assert (targets[0] == 230).any()
+    assert np.array_equal(views[0][::4, ::4, :2], targets[0])
+    assert np.array_equal(views[0][3::4, 3::4, :2], targets[0])
+
+
+def test_photos_are_found_by_their_classes():
+    color = np.zeros((10, 10, 3), np.uint8)
+    plain, rare = (Photo(name, color, np.ones((10, 10), np.uint8)) for name in ("plain", "rare"))
+    rare.labels[0, 0] = 5
+    names = [[photo.name for photo in group] for group in photos_by_class([plain, rare])]
+    assert names == [["plain", "rare"], ["rare"]]
+
+
+def test_rare_classes_weigh_more():
+    labels = np.ones((10, 10), np.uint8)
+    labels[0, :4] = 5
+    labels[1, :9] = 2
+    weights = class_weights([Photo("x", np.zeros((10, 10, 3), np.uint8), labels)])
+    assert weights.shape == (40,)
+    assert weights[4] > weights[0]
+
+
+def test_learning_rate_climbs_then_falls():
+    rates = [learning_rate(step, 100, 0.1) for step in range(100)]
+    assert np.argmax(rates) in (9, 10)
+    assert rates[0] == pytest.approx(0.1)
+    assert rates[-1] < 0.01
+
+
+def test_the_mean_of_networks_lies_between_them(rooms, tmp_path):
+    paths = [train(rooms, settings(), tmp_path / "a"), train(rooms, settings(epochs=1), tmp_path / "b")]
+    config = settings()
+    mean = read_tensors(average(rooms, [paths[0], paths[1], paths[1]], config, tmp_path / "mean"))
+    a, b = map(read_tensors, paths)
+    for name, value in mean.items():
+        if value.is_floating_point():
+            torch.testing.assert_close(value, (a[name] + 2 * b[name]) / 3, rtol=2e-3, atol=1e-4)
+    assert load_graph(tmp_path / "mean" / "weights.onnx", "int8")
+    with pytest.raises(ModelError, match="no network weights"):
+        average(rooms, [paths[0], tmp_path / "absent.pt"], config, tmp_path / "mean")
+
+
+def test_networks_of_different_widths_have_no_mean(rooms, tmp_path):
+    save_weights(build_mobilenet_deeplab(decoder_channels=32), tmp_path / "narrow.pt")
+    with pytest.raises(ModelError, match="width"):
+        average(rooms, [SHIPPED, tmp_path / "narrow.pt"], settings(), tmp_path / "mean")
+
+
+def test_wider_networks_are_narrowed_before_the_mean(rooms, tmp_path):
+    narrow = settings(decoder_channels=32)
+    one = average(rooms, [SHIPPED], narrow, tmp_path / "one")
+    again = average(rooms, [one, SHIPPED], narrow, tmp_path / "again")
+    first, second = read_tensors(one), read_tensors(again)
+    assert first["classifier.weight"].shape == (40, 32, 1, 1)
+    assert all(torch.allclose(first[name], second[name], rtol=1e-2, atol=1e-3) for name in first)
+
+
+def test_trainings_from_one_start_keep_the_same_channels(rooms, tmp_path):
+    """Whatever the seed, or their networks would have no mean."""
+    first, second = (
+        read_tensors(
+            train(
+                rooms,
+                settings(start=str(SHIPPED), decoder_channels=32, freeze_norms=True, rate=1e-9, seed=s),
+                tmp_path / f"{s}",
+            )
+        )
+        for s in (0, 1)
+    )
+    assert first["classifier.weight"].shape == (40, 32, 1, 1)
+    assert all(torch.allclose(first[name], second[name], atol=1e-3) for name in first if "decoder" in name)
+
+
+def test_scores_of_a_case_done_by_hand():
+    truth = np.array([[1, 1, 1, 2], [2, 2, 0, 0]], np.uint8)
+    given = np.array([[1, 1, 2, 2], [2, 3, 1, 1]], np.uint8)
+    result = score(confusion_matrix(truth, given))
+    assert result.per_class_iou["wall"] == pytest.approx(2 / 3)
+    assert result.per_class_iou["floor"] == pytest.approx(2 / 4)
+    assert result.per_class_iou["cabinet"] is None
+    assert result.miou == pytest.approx((2 / 3 + 2 / 4) / 2)
+    assert result.pixel_accuracy == pytest.approx(4 / 6)
+    assert result.mean_class_accuracy == pytest.approx(2 / 3)
+
+
+def test_shipped_network_meets_its_model_card(shared):
+    directory = shared / "data" / "nyuv2"
+    result = evaluate(build_segmenter(load_config()), directory)
+    assert result.miou > 0.37
+    assert result.pixel_accuracy > 0.67

@@ -1,0 +1,67 @@
+"""Commands on saved runs and graphs."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from semslam.backend.graph.g2o import read_g2o, write_g2o
+from semslam.backend.graph.products import Edge, PosedGraph
+from semslam.geometry.se3 import compose, exp_so3, invert, make_transform
+from tests.conftest import Call
+
+STEP = make_transform(exp_so3([0.0, 0.0, 2 * np.pi / 24]), [0.4, 0.0, 0.0])
+
+
+@pytest.fixture
+def ring(tmp_path: Path) -> Path:
+    """A ring of 24 poses, closed by four true loops and one false one."""
+    poses = compose([STEP] * 23, np.eye(4))
+    covariance = 1e-4 * np.eye(6)
+    edges = [Edge(i, i + 1, STEP, covariance) for i in range(23)]
+    edges += [Edge(a, b, invert(poses[a]) @ poses[b], covariance) for a, b in ((0, 23), (1, 22), (0, 21), (2, 20))]
+    edges.append(Edge(3, 15, make_transform(np.eye(3), [0.1, 0.0, 0.0]), covariance))
+    file = tmp_path / "ring.g2o"
+    write_g2o(file, PosedGraph(dict(enumerate(poses)), tuple(edges)))
+    return file
+
+
+def test_a_graph_from_elsewhere_is_judged(semslam: Call, ring: Path, tmp_path: Path) -> None:
+    outcome = semslam("graph", ring, "--out", tmp_path / "better.g2o")
+    assert outcome.code == 0, outcome.err
+    assert "4 of 5 accepted" in outcome.out
+    assert "refused: 3 - 15" in outcome.out
+    assert len(read_g2o(tmp_path / "better.g2o").edges) == 23 + 4
+
+
+@pytest.mark.parametrize("content", ["", "EDGE_SE3:QUAT 0 1 nonsense\n", "\x00\x01"])
+def test_a_file_that_is_no_graph_is_one_sentence(semslam: Call, tmp_path: Path, content: str) -> None:
+    (tmp_path / "bad.g2o").write_text(content)
+    outcome = semslam("graph", tmp_path / "bad.g2o")
+    assert outcome.code == 2
+    assert len(outcome.err.strip().splitlines()) == 1
+
+
+def test_a_ledger_is_filtered(semslam: Call, tmp_path: Path) -> None:
+    entry = {
+        "query": 9, "match": 1, "query_frame": 90, "match_frame": 10, "query_time": 9.0, "match_time": 1.0,
+        "detector": "semantic", "score": 0.8, "evidence": {"labels": [], "nodes": [], "figures": {}},
+        "verdict": "rejected", "reason": "few_inliers", "figure": 7.0, "limit": 20.0, "truth": None,
+    }  # fmt: skip
+    kept = entry | {
+        "verdict": "accepted",
+        "reason": None,
+        "truth": {"judgement": "true", "translation_m": 0.1, "rotation_deg": 1.0},
+    }
+    (tmp_path / "loops.jsonl").write_text(f"{json.dumps(entry)}\n{json.dumps(kept)}\n")
+    assert json.loads(semslam("ledger", tmp_path, "--verdict", "rejected", "--json").out)["reason"] == "few_inliers"
+    assert json.loads(semslam("ledger", tmp_path, "--truth", "true", "--json").out)["verdict"] == "accepted"
+    assert "2 candidates" in semslam("ledger", tmp_path).out
+    assert semslam("ledger", tmp_path, "--verdict", "maybe").code == 2
+
+
+def test_stress_needs_a_run(semslam: Call, tmp_path: Path) -> None:
+    outcome = semslam("stress", tmp_path)
+    assert outcome.code == 2
+    assert "no run folder" in outcome.err

@@ -1,0 +1,214 @@
+"""Every registered loader fills the role of a dataset."""
+
+from collections.abc import Callable
+from itertools import pairwise
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from semslam import plugins
+from semslam.config import DatasetConfig, FaultConfig
+from semslam.datasets import Dataset, guess_loader, open_dataset
+from semslam.datasets.camera_file import write_camera
+from semslam.geometry.camera import Intrinsics
+from semslam.types import Trajectory
+
+CAMERA = Intrinsics(64, 48, 60.0, 60.0, 31.5, 23.5)
+COUNT = 4
+POSE_ROW = "{stamp} {x} 0 0 0 0 0 1\n"
+
+
+def color_image(index: int, size: tuple[int, int] = (64, 48)) -> np.ndarray:
+    rng = np.random.default_rng(index)
+    return rng.integers(0, 255, (size[1], size[0], 3), dtype=np.uint8)
+
+
+def depth_image(index: int, size: tuple[int, int] = (64, 48)) -> np.ndarray:
+    depth = np.full((size[1], size[0]), 5000 + 100 * index, np.uint16)
+    depth[:5] = 0
+    return depth
+
+
+def write_images(color: Path, depth: Path, index: int, size: tuple[int, int] = (64, 48)) -> None:
+    for file, image in ((color, color_image(index, size)), (depth, depth_image(index, size))):
+        file.parent.mkdir(parents=True, exist_ok=True)
+        assert cv2.imwrite(str(file), image)
+
+
+def make_tum(folder: Path) -> Path:
+    folder = folder / "some_room"
+    rows: dict[str, str] = {"rgb": "# color\n", "depth": "# depth\n", "groundtruth": "# poses\n"}
+    for i in range(COUNT):
+        write_images(folder / f"rgb/{i}.png", folder / f"depth/{i}.png", i)
+        rows["rgb"] += f"{100 + i / 30:.6f} rgb/{i}.png\n"
+        rows["depth"] += f"{100.004 + i / 30:.6f} depth/{i}.png\n"
+        rows["groundtruth"] += POSE_ROW.format(stamp=100 + i / 30, x=i)
+    for name, text in rows.items():
+        (folder / f"{name}.txt").write_text(text)
+    write_camera(folder / "camera.yaml", CAMERA, 5000.0)
+    return folder
+
+
+def make_folder(folder: Path) -> Path:
+    for i in range(COUNT):
+        write_images(folder / f"color/{i}.png", folder / f"depth/{i}.png", i)
+    (folder / "groundtruth.txt").write_text("".join(POSE_ROW.format(stamp=i / 30, x=i) for i in range(COUNT)))
+    write_camera(folder / "camera.yaml", CAMERA, 1000.0)
+    return folder
+
+
+def make_seven_scenes(folder: Path) -> Path:
+    folder = folder / "stairs" / "seq-01"
+    for i in range(COUNT):
+        stem = folder / f"frame-{i:06d}"
+        write_images(Path(f"{stem}.color.png"), Path(f"{stem}.depth.png"), i, (640, 480))
+        Path(f"{stem}.pose.txt").write_text(f"1 0 0 {i}\n0 1 0 0\n0 0 1 0\n0 0 0 1\n")
+    return folder
+
+
+def make_rosbag(folder: Path) -> Path:
+    writing = pytest.importorskip("rosbags.rosbag1", reason="the extra 'ros' is not installed")
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS1_NOETIC)
+    types = store.types
+    header, image_type, info_type = (
+        types[name] for name in ("std_msgs/msg/Header", "sensor_msgs/msg/Image", "sensor_msgs/msg/CameraInfo")
+    )
+    region = types["sensor_msgs/msg/RegionOfInterest"]
+    with writing.Writer(folder / "some.bag") as bag:
+        topics = {
+            name: bag.add_connection(f"/camera/{name}", kind.__msgtype__, typestore=store)
+            for name, kind in (
+                ("rgb/image_color", image_type), ("depth/image", image_type), ("rgb/camera_info", info_type)
+            )
+        }  # fmt: skip
+
+        def write(topic: str, nanoseconds: int, message: object) -> None:
+            connection = topics[topic]
+            bag.write(connection, nanoseconds, store.serialize_ros1(message, connection.msgtype))
+
+        for i in range(COUNT):
+            now = 10**18 + i * 33_000_000
+            stamp = types["builtin_interfaces/msg/Time"](sec=now // 10**9, nanosec=now % 10**9)
+            head = header(seq=i, stamp=stamp, frame_id="camera")
+            color = color_image(i)
+            depth = depth_image(i).astype(np.float32) / 5000
+            depth[:5] = np.nan
+            no_region = region(x_offset=0, y_offset=0, height=0, width=0, do_rectify=False)
+            write("rgb/image_color", now, image_type(head, 48, 64, "rgb8", 0, 192, color.ravel()))
+            write(
+                "depth/image", now + 2_000_000, image_type(head, 48, 64, "32FC1", 0, 256, depth.view(np.uint8).ravel())
+            )
+            K, P = CAMERA.matrix.ravel(), np.zeros(12)
+            info = info_type(head, 48, 64, "plumb_bob", np.zeros(5), K, np.eye(3).ravel(), P, 0, 0, no_region)
+            write("rgb/camera_info", now, info)
+    (folder / "some-groundtruth.txt").write_text(POSE_ROW.format(stamp=10**9, x=0))
+    return folder / "some.bag"
+
+
+MAKERS: dict[str, Callable[[Path], Path | str]] = {
+    "tum": make_tum,
+    "folder": make_folder,
+    "seven_scenes": make_seven_scenes,
+    "rosbag": make_rosbag,
+    "synthetic": lambda _: "synthetic",
+}
+
+
+@pytest.fixture(scope="module", params=plugins.names("semslam.datasets"))
+def opened(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[str, Path | str]:
+    name = request.param
+    if name not in MAKERS:
+        pytest.skip(f"no sample of the outside loader '{name}'")
+    return name, MAKERS[name](tmp_path_factory.mktemp(name))
+
+
+@pytest.fixture(scope="module")
+def dataset(opened: tuple[str, Path | str]) -> Dataset:
+    return open_dataset(opened[1], DatasetConfig(max_frames=COUNT))
+
+
+def test_the_loader_is_guessed_from_the_path(opened: tuple[str, Path | str]) -> None:
+    assert guess_loader(opened[1]) == opened[0]
+
+
+def test_it_fills_the_role(dataset: Dataset) -> None:
+    assert isinstance(dataset, Dataset)
+    assert dataset.name
+    assert all(isinstance(note, str) for note in dataset.notes)
+    assert dataset.ground_truth is None or isinstance(dataset.ground_truth, Trajectory)
+
+
+def test_the_stamps_ascend(dataset: Dataset) -> None:
+    assert len(dataset) == len(dataset.timestamps) == COUNT
+    assert all(earlier < later for earlier, later in pairwise(dataset.timestamps))
+
+
+def test_frames_are_as_promised(dataset: Dataset) -> None:
+    for i, frame in enumerate(dataset):
+        shape = (dataset.intrinsics.height, dataset.intrinsics.width)
+        assert (frame.index, frame.timestamp, frame.intrinsics) == (i, dataset.timestamps[i], dataset.intrinsics)
+        assert frame.color.shape == (*shape, 3)
+        assert frame.color.dtype == np.uint8
+        assert frame.depth.shape == shape
+        assert frame.depth.dtype == np.float32
+        assert np.isfinite(frame.depth).all()
+        assert (frame.depth >= 0).all()
+        assert (frame.depth > 0).any()
+        assert (frame.depth < 100).all()
+
+
+def test_frames_are_the_same_in_any_order(dataset: Dataset) -> None:
+    forward = list(dataset)
+    for i in reversed(range(len(dataset))):
+        again = dataset.frame(i)
+        assert np.array_equal(again.color, forward[i].color)
+        assert np.array_equal(again.depth, forward[i].depth)
+
+
+def test_there_are_no_frames_outside(dataset: Dataset) -> None:
+    for index in (-1, len(dataset)):
+        with pytest.raises(IndexError):
+            dataset.frame(index)
+
+
+def test_ground_truth_meets_the_frames(dataset: Dataset) -> None:
+    if dataset.ground_truth is not None:
+        first, last = dataset.ground_truth.timestamps[[0, -1]]
+        assert first <= dataset.timestamps[-1]
+        assert last >= dataset.timestamps[0]
+
+
+def test_selection_and_faults_keep_the_role(opened: tuple[str, Path | str]) -> None:
+    config = DatasetConfig(start=1, stride=2, max_frames=2, faults=FaultConfig(black=((0.0, 1.0),)))
+    chosen = open_dataset(opened[1], config)
+    assert isinstance(chosen, Dataset)
+    assert [frame.index for frame in chosen] == [0, 1]
+    assert not chosen.frame(0).color.any()
+    assert "black" in chosen.notes[-1]
+
+
+def test_the_colours_are_rgb(tmp_path: Path) -> None:
+    """Red is the first channel: written by OpenCV as the last of BGR."""
+    for make in (make_tum, make_folder):
+        folder = make(tmp_path / make.__name__)
+        frame = open_dataset(folder).frame(1)
+        assert np.array_equal(frame.color, color_image(1)[..., ::-1])
+    bag = open_dataset(make_rosbag(tmp_path)).frame(1)
+    assert np.array_equal(bag.color, color_image(1))
+
+
+def test_real_frames(shared: Path) -> None:
+    dataset = open_dataset(shared / "data" / "rgbd_dataset_freiburg1_rpy_5frames")
+    assert len(dataset) == 5
+    assert dataset.timestamps[0] == pytest.approx(1305031229.528748, abs=1e-9)
+    assert dataset.intrinsics.fx == 517.306408
+    assert dataset.ground_truth is not None
+    assert len(dataset.ground_truth) == 391
+    assert dataset.notes == []
+    frame = dataset.frame(4)
+    assert 0.5 < float(np.median(frame.depth[frame.depth > 0])) < 3.0
+    assert frame.color.mean() > 50
