@@ -20,7 +20,13 @@ from semslam.backend.graph.factors import (
 from semslam.backend.graph.products import Edge, GraphSolution, LoopVerdict, loop_edge
 from semslam.backend.robust.calibration import cycle_scale, loop_scale, odometry_scale
 from semslam.backend.robust.plausibility import Screening, screen_loops
-from semslam.backend.robust.strategies import RobustProblem, RobustSolution, solve_robustly
+from semslam.backend.robust.strategy import (
+    RobustProblem,
+    RobustSolution,
+    RobustStrategy,
+    build_strategy,
+    solve_robustly,
+)
 from semslam.config import BackendConfig
 from semslam.geometry.se3 import invert
 from semslam.types import FloatArray, LoopConstraint, RejectionReason
@@ -70,6 +76,7 @@ def optimize_graph(problem: GraphProblem, config: BackendConfig, marginals: bool
         GraphError: the optimiser failed.
         ConfigError: the strategy's name is unknown.
     """
+    strategy = build_strategy(config)
     edges = [loop_edge(constraint) for constraint in problem.constraints]
     maps = sorted(connected_components(problem.poses, problem.odometry))
     start: dict[int, FloatArray] = {}
@@ -79,13 +86,14 @@ def optimize_graph(problem: GraphProblem, config: BackendConfig, marginals: bool
     odometry_factor, loop_factor = _scales(problem, edges, config)
     loops = [edge.widened(loop_factor) for edge in edges]
     odometry = [edge.widened(odometry_factor) for edge in problem.odometry]
-    screening = _screen(problem, odometry, loops, config)
+    screening = _screen(problem, odometry, loops, strategy, config)
     eligible = [loop for loop, fit in zip(loops, screening.eligible, strict=True) if fit]
     trusted = _trusted(problem, maps, start, odometry)
     robust = RobustProblem(trusted, odometry, eligible, make_values(start), config.max_residual, config.max_iterations)
-    result = solve_robustly(config.robust, robust)
+    result = solve_robustly(strategy, robust)
     poses = read_poses(result.values, problem.poses)
-    verdicts = _judge(problem, result, loops, screening, poses, config)
+    limit = np.inf if strategy.accepts_all else config.max_residual
+    verdicts = _judge(problem, result, loops, screening, poses, limit)
     accepted = np.array([verdict.accepted for verdict in verdicts], dtype=bool)
     kept = [edge for edge, good in zip(edges, accepted, strict=True) if good]
     components = connected_components(problem.poses, [*problem.odometry, *kept])
@@ -115,9 +123,15 @@ def _scales(problem: GraphProblem, loops: Sequence[Edge], config: BackendConfig)
     return max(of_cycles, odometry_scale(chain, widened, believable)), of_loops
 
 
-def _screen(problem: GraphProblem, odometry: Sequence[Edge], loops: Sequence[Edge], config: BackendConfig) -> Screening:
+def _screen(
+    problem: GraphProblem,
+    odometry: Sequence[Edge],
+    loops: Sequence[Edge],
+    strategy: RobustStrategy,
+    config: BackendConfig,
+) -> Screening:
     """Which loops may take part, and why others may not."""
-    if config.robust == "none" or config.drift_slack == 0:
+    if strategy.accepts_all or config.drift_slack == 0:
         return Screening(np.zeros(len(loops)), (None,) * len(loops))
     chain = OdometryChain(problem.poses, odometry)
     return screen_loops(chain, loops, config.max_residual, config.drift_slack)
@@ -141,14 +155,15 @@ def _judge(
     loops: Sequence[Edge],
     screening: Screening,
     poses: Mapping[int, FloatArray],
-    config: BackendConfig,
+    limit: float,
 ) -> tuple[LoopVerdict, ...]:
+    """A verdict for each loop; one is accepted that has weight and a residual of at most ``limit``."""
     verdicts, weights = [], iter(result.weights)
     screened = zip(screening.distances.tolist(), screening.reasons, strict=True)
     for constraint, edge, (drift, reason) in zip(problem.constraints, loops, screened, strict=True):
         weight = 0.0 if reason else float(next(weights))
         residual = mahalanobis(edge, poses)
-        accepted = config.robust == "none" or (weight > 0 and residual <= config.max_residual)
+        accepted = weight > 0 and residual <= limit
         why = None if accepted else reason or RejectionReason.OUTLIER
         verdicts.append(LoopVerdict(constraint, weight, bool(accepted), residual, drift, why))
     return tuple(verdicts)

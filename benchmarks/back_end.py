@@ -30,11 +30,11 @@ from semslam.backend.graph.g2o import read_g2o
 from semslam.backend.graph.products import Edge, PosedGraph
 from semslam.backend.incremental import IncrementalPoseGraph
 from semslam.backend.pose_graph import PoseGraph
-from semslam.backend.robust.strategies import STRATEGIES
 from semslam.config import BackendConfig, BundleConfig
 from semslam.errors import SemslamError
 from semslam.geometry.camera import Intrinsics
 from semslam.geometry.se3 import FloatArray, compose, make_transform
+from semslam.plugins import ROBUST
 from semslam.studies.false_loops import StressRow, stress_run
 from semslam.types import Observations
 
@@ -258,7 +258,7 @@ def main() -> None:
         command.set_defaults(work=work)
         if name in ("stress", "rings"):
             command.add_argument("--seeds", type=int, default=3)
-            command.add_argument("--strategies", nargs="+", default=list(STRATEGIES))
+            command.add_argument("--strategies", nargs="+", default=list(ROBUST))
         if name == "stress":
             command.add_argument("runs", nargs="+", type=Path, help="run folders with ground truth")
         if name == "graphs":

@@ -15,7 +15,7 @@ from semslam.backend.graph.factors import (
     read_poses,
 )
 from semslam.backend.graph.products import GraphSolution
-from semslam.backend.robust.strategies import least_squares
+from semslam.backend.robust.least_squares import optimise
 from semslam.config import BackendConfig
 from semslam.types import FloatArray, LoopConstraint
 
@@ -49,11 +49,11 @@ def leave_one_out(solution: GraphSolution, config: BackendConfig) -> Iterator[Co
     accepted = [verdict.constraint for verdict in solution.verdicts if verdict.accepted]
     factors = _factors(solution)
     offset = len(factors) - len(accepted)
-    values = least_squares(_graph(factors), make_values(solution.poses), config.max_iterations)
+    values = optimise(_graph(factors), make_values(solution.poses), config.max_iterations)
     whole, poses_with = 2.0 * _graph(factors).error(values), read_poses(values, solution.poses)
     for index, constraint in enumerate(accepted):
         rest = _graph([*factors[: offset + index], *factors[offset + index + 1 :]])
-        without = least_squares(rest, values, config.max_iterations)
+        without = optimise(rest, values, config.max_iterations)
         poses = read_poses(without, solution.poses)
         tension = whole - 2.0 * rest.error(without)
         yield Contribution(constraint, tension, _shift(poses, poses_with), poses, poses_with)

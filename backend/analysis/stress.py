@@ -9,7 +9,6 @@ import numpy as np
 from semslam.backend.analysis.judge import constraint_of, rebuilt, split_edges
 from semslam.backend.graph.chain import OdometryChain
 from semslam.backend.graph.products import Edge, GraphSolution, PosedGraph
-from semslam.backend.robust.strategies import STRATEGIES
 from semslam.config import BackendConfig
 from semslam.errors import ConfigError, GraphError
 from semslam.geometry.se3 import exp_so3, invert, make_transform
@@ -77,7 +76,7 @@ class StressOutcome:
 def stress(
     graph: PosedGraph,
     attacks: Sequence[Attack],
-    strategies: Sequence[str] = tuple(STRATEGIES),
+    strategies: Sequence[str],
     config: BackendConfig | None = None,
 ) -> tuple[StressOutcome, ...]:
     """Optimise a good graph with injected false loops, by each strategy and from odometry alone.
@@ -85,7 +84,7 @@ def stress(
     Args:
         graph: optimised poses, odometry and loops that are taken for true.
         attacks: the false loops, one set after the other.
-        strategies: names from ``backend.robust``.
+        strategies: registered names of robust strategies.
         config: limits of the optimisation.
 
     Returns:

@@ -22,7 +22,7 @@ from semslam.backend.graph.factors import (
     read_poses,
 )
 from semslam.backend.graph.products import Edge
-from semslam.backend.robust.strategies import least_squares
+from semslam.backend.robust.least_squares import optimise
 from semslam.config import BundleConfig
 from semslam.errors import GraphError
 from semslam.types import FloatArray, Intrinsics, Observations
@@ -93,7 +93,7 @@ def adjust(
     for landmark, point in enumerate(sightings.points):
         values.insert(gtsam.symbol("l", landmark), point)
     factors = _observation_factors(sightings, intrinsics, config)
-    held = _pose_factors(poses, edges, config.sighting_share)
+    held = _pose_factors(poses, edges, config.observation_share)
     kept = np.ones(len(sightings), dtype=bool)
     rounds = []
     for _ in range(config.rounds):
@@ -118,7 +118,7 @@ def _adjusted(
     for index in np.flatnonzero(kept):
         graph.push_back(factors[int(index)])
     try:
-        result = least_squares(graph, values, iterations, TOLERANCE)
+        result = optimise(graph, values, iterations, TOLERANCE)
     except RuntimeError as error:  # GTSAM's own, such as an indeterminate system
         raise GraphError(f"The bundle could not be adjusted: {' '.join(str(error).split())}") from error
     if not np.isfinite(graph.error(result)):
@@ -160,14 +160,14 @@ def _noises(sigma: float, config: BundleConfig) -> tuple[gtsam.noiseModel.Robust
 
 
 def _pose_factors(
-    poses: Mapping[int, FloatArray], edges: Sequence[Edge], sighting_share: float
+    poses: Mapping[int, FloatArray], edges: Sequence[Edge], observation_share: float
 ) -> gtsam.NonlinearFactorGraph:
     """The edges, held as much tighter as sightings are to count less: so outliers stay a matter of pixels."""
     graph = gtsam.NonlinearFactorGraph()
     for index, (key, T_world_cam) in enumerate(sorted(poses.items())):
         graph.add(prior_factor(key, T_world_cam, FLOATING_SIGMA if index else ANCHOR_SIGMA))
     for edge in edges:
-        graph.add(between_factor(replace(edge, covariance=edge.covariance * sighting_share)))
+        graph.add(between_factor(replace(edge, covariance=edge.covariance * observation_share)))
     return graph
 
 

@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 from pydantic import BaseModel, ConfigDict
 
+from semslam import plugins
 from semslam.backend.analysis.stress import Attack, stress
 from semslam.backend.graph.g2o import read_g2o
 from semslam.backend.graph.products import GraphSolution
-from semslam.backend.robust.strategies import STRATEGIES
 from semslam.errors import ResultsError, TrajectoryError
 from semslam.eval.trajectory import score_trajectory
 from semslam.runs.results import SavedRun, read_run
@@ -45,7 +45,7 @@ def stress_run(directory: Path, attacks: Sequence[Attack], strategies: Sequence[
         ResultsError: it is no run folder, or was written by another version.
     """
     saved = read_run(directory)
-    names = list(STRATEGIES) if strategies is None else list(strategies)
+    names = plugins.names("semslam.robust") if strategies is None else list(strategies)
     graph = read_g2o(directory / "graph.g2o")
     outcomes = stress(graph, attacks, names, saved.config.backend)
     return [

@@ -73,12 +73,12 @@ def test_consistent_groups_agree_among_themselves():
 def test_stress_needs_loops_room_and_a_share():
     lonely = PosedGraph(dict(enumerate(ring(5))), tuple(measure_odometry(ring(5), np.random.default_rng(0))))
     with pytest.raises(GraphError, match="no loop"):
-        stress(lonely, [Attack(0.3)])
+        stress(lonely, [Attack(0.3)], ["none"])
     with pytest.raises(ConfigError, match="share"):
         Attack(1.0)
     small = PosedGraph(lonely.poses, (*lonely.edges, *measure(ring(5), [(0, 4)], np.random.default_rng(0))))
     with pytest.raises(GraphError, match="too small"):
-        stress(small, [Attack(0.5)])
+        stress(small, [Attack(0.5)], ["none"])
 
 
 def test_edges_are_told_apart_by_their_keys():

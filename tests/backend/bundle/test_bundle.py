@@ -125,7 +125,7 @@ def test_sightings_that_repeat_their_errors_do_not_outweigh_the_edges():
     edges = measure(truth, [(k, k + 1) for k in range(15)], rng, 0.02)
     start = dict(enumerate(truth))
     alone, shared = (
-        adjust(start, seen, CAMERA, BundleConfig(sighting_share=share), edges).poses for share in (1.0, 0.0625)
+        adjust(start, seen, CAMERA, BundleConfig(observation_share=share), edges).poses for share in (1.0, 0.0625)
     )
     assert error(shared, truth) < 0.7 * error(alone, truth)
 

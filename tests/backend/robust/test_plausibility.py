@@ -9,9 +9,9 @@ from semslam.backend.graph.chain import OdometryChain
 from semslam.backend.pose_graph import Edge, PoseGraph
 from semslam.backend.robust.calibration import cycle_scale
 from semslam.backend.robust.plausibility import screen_loops
-from semslam.backend.robust.strategies import STRATEGIES
 from semslam.config import BackendConfig
 from semslam.geometry.se3 import compose, make_transform
+from semslam.plugins import ROBUST
 
 TOUR = ring(15, laps=1, radius=0.8)
 APART = np.array([4.3, 0.0, 0.0])
@@ -57,7 +57,7 @@ def reasons(solution):
     return [verdict.reason for verdict in solution.verdicts]
 
 
-@pytest.mark.parametrize("robust", [name for name in STRATEGIES if name != "none"])
+@pytest.mark.parametrize("robust", [name for name in ROBUST if name != "none"])
 def test_loops_between_twin_rooms_are_refused_though_they_are_the_more(robust):
     rng = np.random.default_rng(0)
     true, false = loops_of(rng)
