@@ -35,7 +35,7 @@ from semslam.frontend.keyframes import make_keyframe
 from semslam.geometry.se3 import invert, rotation_angle
 from semslam.loop.detector import LoopDetector
 from semslam.loop.segmentation.build import build_segmenter
-from semslam.loop.verification.verification import IcpVerifier
+from semslam.loop.verification.icp import IcpVerifier
 from semslam.studies.detectors import compare_detectors, exhaustive_detector, keyframe_views
 from semslam.types import FloatArray, Frame, KeyframeView, LoopConstraint
 
@@ -139,7 +139,7 @@ def wrong_and_near(dataset: Dataset, views: list[KeyframeView], min_gap: float) 
 
 def changed_views(views: list[KeyframeView], config: Config) -> Iterator[tuple[int, Change, KeyframeView]]:
     """Every third view, unchanged and with each change that it can show, asked for long after the last one."""
-    segmenter, extractor = build_segmenter(config), FeatureExtractor(config.features)
+    segmenter, extractor = build_segmenter(config), FeatureExtractor(config.keypoints)
     for row in range(0, len(views), CHANGED_STEP):
         old = views[row]
         frame = Frame(row, old.keyframe.timestamp + LATER, old.color, old.depth, old.keyframe.intrinsics)

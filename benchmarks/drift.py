@@ -40,7 +40,7 @@ from semslam.datasets import Dataset, open_dataset
 from semslam.datasets.selection import Selection
 from semslam.eval.trajectory import poses_at
 from semslam.geometry.se3 import adjoint, invert, tangent
-from semslam.loop.verification.verification import IcpVerifier
+from semslam.loop.verification.icp import IcpVerifier
 from semslam.runs.metrics import Metrics
 from semslam.runs.pipeline import replay, run
 from semslam.runs.recording import Recording, read_recording, write_recording

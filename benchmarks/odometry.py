@@ -28,7 +28,7 @@ from semslam.datasets import Dataset, open_dataset
 from semslam.datasets.tum_format import read_trajectory
 from semslam.eval.trajectory import score_trajectory
 from semslam.frontend.odometry import Odometry
-from semslam.loop.verification.verification import IcpVerifier
+from semslam.loop.verification.icp import IcpVerifier
 from semslam.runs.pipeline import run
 from semslam.runtime.stopwatch import Stopwatch
 from semslam.system.slam import Slam

@@ -24,13 +24,14 @@ from semslam.geometry.se3 import invert, transform_points
 from semslam.loop.segmentation.build import build_segmenter
 from semslam.loop.segmentation.classes import CLASS_COUNT, GROUP_OF_LABEL
 from semslam.loop.segmentation.decoding import shrink
-from semslam.loop.segmentation.network.checkpoint import SHIPPED, load_network
+from semslam.loop.segmentation.network.checkpoint import load_network
 from semslam.loop.segmentation.network.export import float_graph
 from semslam.loop.segmentation.network.network import build_mobilenet_deeplab, count_multiply_adds, count_parameters
 from semslam.loop.segmentation.network.xception import build_xception_deeplab
 from semslam.loop.segmentation.photos import UInt8Array, list_names, read_photo
 from semslam.loop.segmentation.segmenter import Segmenter
 from semslam.loop.segmentation.segmenters.onnx import OnnxSegmenter, load_graph
+from semslam.loop.segmentation.shipped import CHECKPOINT
 from semslam.loop.segmentation.training.evaluation import confusion_matrix, evaluate, score
 from semslam.loop.segmentation.training.self_training import Teacher
 from semslam.types import Frame, LabelMap
@@ -100,7 +101,7 @@ def size_table() -> None:
     """Parameters and multiply-adds of the shipped network and of both backbones with the same decoder."""
     print("| network | decoder's channels | parameters | multiply-adds at 320x240 |\n|---|---|---|---|")
     networks = {
-        "MobileNetV2, shipped": load_network(SHIPPED),
+        "MobileNetV2, shipped": load_network(CHECKPOINT),
         "MobileNetV2": build_mobilenet_deeplab(),
         "Xception-65": build_xception_deeplab(),
     }

@@ -28,8 +28,8 @@ from semslam.frontend.keyframes import make_keyframe
 from semslam.geometry.se3 import FloatArray, invert, rotation_angle, tangent
 from semslam.loop.detector import LoopDetector
 from semslam.loop.segmentation.build import build_segmenter
+from semslam.loop.verification.icp import IcpVerifier
 from semslam.loop.verification.registration import ICP_KINDS
-from semslam.loop.verification.verification import IcpVerifier
 from semslam.types import Keyframe, KeyframeView, LoopConstraint
 
 PAUSE = 1000.0
@@ -54,7 +54,7 @@ def keyframes(path: str, every: int, config: Config, first: int, start: float) -
     dataset, segmenter = open_dataset(path), build_segmenter(config)
     assert dataset.ground_truth is not None, f"{path} has no ground truth."
     poses, _ = poses_at(dataset.ground_truth, dataset.timestamps[::every])
-    extractor, details = FeatureExtractor(config.features), FeatureExtractor(config.verification.features)
+    extractor, details = FeatureExtractor(config.keypoints), FeatureExtractor(config.verification.keypoints)
     for number, index in enumerate(range(0, len(dataset), every)):
         frame = dataset.frame(index)
         found = extractor.extract(frame), details.extract(frame)

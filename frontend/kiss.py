@@ -4,7 +4,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from semslam.config import Config, KissConfig
+from semslam.config import Config, Section, setting
 from semslam.frontend.prediction import ConstantVelocity, RecentVelocity, check_frame, first_motion
 from semslam.geometry.se3 import invert, is_rigid, rotation_angle
 from semslam.types import FloatArray, Frame, Motion, TrackingStatus
@@ -15,12 +15,29 @@ NEIGHBOURS = 12
 """Points that tell a surface's normal."""
 
 
+class KissConfig(Section):
+    """KISS-ICP with a preset for depth cameras."""
+
+    max_range: float = setting(4.0, "depth above which points are ignored", unit="m", gt=0)
+    voxel: float = setting(0.05, "voxel size of the local map", unit="m", gt=0)
+    threshold: float = setting(0.02, "a third of the maximum correspondence distance", unit="m", gt=0)
+    stride: int = setting(4, "use every n-th pixel in both directions", gt=0)
+    min_points: int = setting(500, "minimum number of points of a scan", gt=10)
+    max_surprise: float = setting(0.3, "distance from the prediction above which a scan is lost", unit="m", gt=0)
+    max_surprise_rotation: float = setting(0.5, "rotation from the prediction above which it is lost", unit="rad", gt=0)
+    sigma: float = setting(0.1, "error of one point that calibrates the covariance", unit="m", gt=0)
+
+
 class KissOdometry:
     """Point-to-point ICP against a local voxel map, with a preset for depth cameras. Blind to colour."""
 
-    def __init__(self, config: Config) -> None:
-        self._config = config.kiss
-        self._icp = _make_icp(config.kiss)
+    name = "kiss"
+    reads: tuple[str, ...] = ("kiss",)
+    Settings = KissConfig
+
+    def __init__(self, config: KissConfig) -> None:
+        self._config = config
+        self._icp = _make_icp(config)
         self._prediction = ConstantVelocity()
         self._recent = RecentVelocity()
         self._started = False
@@ -30,7 +47,7 @@ class KissOdometry:
     @classmethod
     def from_config(cls, config: Config) -> Self:
         """Build it from the settings."""
-        return cls(config)
+        return cls(config.section(cls.name, cls.Settings))
 
     def track(self, frame: Frame) -> Motion:
         """Motion since the previous frame; LOST where there is too little depth or the map does not meet it.

@@ -14,10 +14,17 @@ class LoopDetector(Protocol):
     view. Deterministic for a seed.
 
     Attributes:
+        name: the registered name, which its candidates carry.
         needs_labels: whether the views must carry a segmentation.
     """
 
+    name: str
     needs_labels: bool
+
+    @classmethod
+    def from_config(cls, config: Config) -> Self:
+        """Build it from the settings."""
+        ...
 
     def query(self, view: KeyframeView) -> list[LoopCandidate]:
         """Candidates among the added keyframes at least ``loops.min_gap`` older, best first; no side effect.
@@ -32,6 +39,7 @@ class LoopDetector(Protocol):
 class NoLoops:
     """Proposes nothing: odometry alone."""
 
+    name = "none"
     needs_labels = False
 
     @classmethod

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from semslam.config import FeatureConfig
+from semslam.config import KeypointConfig
 from semslam.geometry.camera import Intrinsics
 from semslam.geometry.reprojection import measure, refine_pose, squared_errors
 from semslam.geometry.se3 import Float32Array, FloatArray, invert, make_transform
@@ -25,7 +25,7 @@ NEAR = 2.0
 class FeatureExtractor:
     """ORB keypoints (Rublee et al., ICCV 2011), the strongest few of each cell of a grid, with their depth."""
 
-    def __init__(self, config: FeatureConfig) -> None:
+    def __init__(self, config: KeypointConfig) -> None:
         self._config = config
         # More than are kept, so that weak corners of poor regions are there to choose from.
         self._orb = cv2.ORB.create(

@@ -2,8 +2,7 @@
 
 from typing import Protocol
 
-from semslam.config import DenseConfig
-from semslam.frontend.frame_to_frame.dense import DenseRegistrar
+from semslam.frontend.frame_to_frame.dense import DenseConfig, DenseRegistrar
 from semslam.frontend.frame_to_frame.reference import Registration
 from semslam.types import FloatArray, Frame
 

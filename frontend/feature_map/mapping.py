@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from semslam.config import FeatureMapConfig
 from semslam.frontend.feature_map.adjustment import BundleAdjustment, BundleProblem
 from semslam.frontend.feature_map.landmarks import NONE
 from semslam.frontend.feature_map.local_map import LocalMap, MapKeyframe
 from semslam.frontend.feature_map.map_pose import GATE, View
+from semslam.frontend.feature_map.settings import FeatureMapConfig
 from semslam.geometry.reprojection import Measurements
 from semslam.geometry.se3 import invert, transform_points
 from semslam.types import FloatArray, IntArray

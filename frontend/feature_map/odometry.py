@@ -13,6 +13,7 @@ from semslam.frontend.feature_map.map_pose import Located, View, locate
 from semslam.frontend.feature_map.mapping import Mapper
 from semslam.frontend.feature_map.relocalisation import match_and_solve, relocalise
 from semslam.frontend.feature_map.rolling_shutter import ReadoutEstimate, rectify, velocity_of
+from semslam.frontend.feature_map.settings import FeatureMapConfig
 from semslam.frontend.prediction import ConstantVelocity, check_frame, first_motion, wide_covariance
 from semslam.geometry.reprojection import measure
 from semslam.geometry.se3 import invert, rotation_angle, transform_points
@@ -30,18 +31,22 @@ class FeatureMapOdometry:
     that cannot be tracked is looked for in all maps; where that fails for a while, a new map starts.
     """
 
+    name = "feature_map"
+    reads: tuple[str, ...] = ("feature_map", "keypoints", "seed")
+    Settings = FeatureMapConfig
+
     def __init__(self, config: Config, bridge: Bridge | None = None) -> None:
-        self._config = config.feature_map
+        own = self._config = config.section(FeatureMapOdometry.name, FeatureMapConfig)
         self._bridge = bridge or NoBridge()
         self._seed = config.seed
         # Fewer and wider levels than the verification's: cheaper, and landmarks are placed better.
-        self._scale = config.feature_map.scale
-        pyramid = {"levels": config.feature_map.levels, "scale": config.feature_map.scale}
-        self._extractor = FeatureExtractor(config.features.model_copy(update=pyramid))
-        self._map = LocalMap(config.features.count, self._scale)
-        self._mapper = Mapper(self._map, config.feature_map)
+        self._scale = own.scale
+        pyramid = {"levels": own.levels, "scale": own.scale}
+        self._extractor = FeatureExtractor(config.keypoints.model_copy(update=pyramid))
+        self._map = LocalMap(config.keypoints.count, self._scale)
+        self._mapper = Mapper(self._map, own)
         self._prediction = ConstantVelocity()
-        self._readout = ReadoutEstimate(config.feature_map.readout, config.feature_map.readout_sigma)
+        self._readout = ReadoutEstimate(own.readout, own.readout_sigma)
         self._reference: MapKeyframe | None = None
         self._T_ref_prev: FloatArray = np.eye(4)
         self._T_reported: FloatArray = np.eye(4)
@@ -212,14 +217,14 @@ class FeatureMapOdometry:
         assert self._reference is not None
         elapsed = view.timestamp - self._keyframe_time
         depths = np.count_nonzero(view.features.depths)
-        if elapsed < self._config.min_interval or depths < self._config.min_landmarks:
+        if elapsed < self._config.insert_min_interval or depths < self._config.min_landmarks:
             return False
         T_ref_cam = invert(self._reference.T_map_cam) @ found.T_map_cam
         return bool(
-            elapsed >= self._config.max_interval
-            or np.linalg.norm(T_ref_cam[:3, 3]) > self._config.max_translation
-            or rotation_angle(T_ref_cam) > self._config.max_rotation
-            or len(found.landmarks) < self._config.min_share * depths
+            elapsed >= self._config.insert_max_interval
+            or np.linalg.norm(T_ref_cam[:3, 3]) > self._config.insert_translation
+            or rotation_angle(T_ref_cam) > self._config.insert_rotation
+            or len(found.landmarks) < self._config.insert_share * depths
         )
 
     def _insert(self, view: View, T_map_cam: FloatArray, landmarks: IntArray, keypoints: IntArray) -> None:

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from semslam.config import Config, DenseConfig
+from semslam.config import Config, Section, setting
 from semslam.frontend.frame_to_frame.reference import ReferenceOdometry, Registration
 from semslam.geometry.camera import Intrinsics
 from semslam.geometry.se3 import adjoint, invert, is_rigid
@@ -19,6 +19,24 @@ MIN_SIZE = 32
 """Pixels; smaller images have no pyramid."""
 MEET = 0.05
 """Metres within which two depths are of one surface."""
+
+
+class DenseConfig(Section):
+    """Dense RGB-D registration, of frames to frames or to a keyframe."""
+
+    max_depth: float = setting(4.0, "depth above which a measurement is ignored", unit="m", gt=0)
+    steps: tuple[int, ...] = setting((10, 5, 3), "iterations, coarsest level first", min_length=1)
+    min_coverage: float = setting(0.05, "share of pixels that must have depth", gt=0, le=1)
+    min_contrast: float = setting(4.0, "standard deviation of an image's brightness", unit="grey levels", ge=0)
+    min_fitness: float = setting(0.3, "share of pixels that must be inliers of a motion", gt=0, le=1)
+    keyframe_translation: float = setting(
+        0.1, "motion after which dense_keyframe replaces its keyframe", unit="m", ge=0
+    )
+    keyframe_rotation: float = setting(
+        0.15, "rotation after which dense_keyframe replaces its keyframe", unit="rad", ge=0
+    )
+    max_bridge: float = setting(0.2, "maximum time between frames that auto registers densely", unit="s", gt=0)
+    sigma: float = setting(0.6, "error of one pixel's depth that calibrates the covariance", unit="m", gt=0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -92,10 +110,14 @@ class DenseOdometry(ReferenceOdometry[DenseView]):
     LOST where there is no depth or the images do not meet.
     """
 
+    name = "dense"
+    reads: tuple[str, ...] = ("dense",)
+    Settings = DenseConfig
+
     @classmethod
     def from_config(cls, config: Config) -> Self:
         """Build it from the settings."""
-        return cls(DenseRegistrar(config.dense))
+        return cls(DenseRegistrar(config.section(cls.name, DenseConfig)))
 
 
 def _undistort(

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Self
 
 from semslam.config import Config
-from semslam.frontend.frame_to_frame.dense import DenseRegistrar, DenseView
+from semslam.frontend.frame_to_frame.dense import DenseConfig, DenseOdometry, DenseRegistrar, DenseView
 from semslam.frontend.frame_to_frame.feature import FeatureRegistrar, FeatureView
 from semslam.frontend.frame_to_frame.reference import Reach, ReferenceOdometry, Registration
 from semslam.types import FloatArray, Frame
@@ -18,7 +18,7 @@ class _View:
 
 class _Registrar:
     def __init__(self, config: Config) -> None:
-        self._dense = DenseRegistrar(config.dense)
+        self._dense = DenseRegistrar(config.section(DenseOdometry.name, DenseConfig))
         self._features = FeatureRegistrar(config)
 
     def prepare(self, frame: Frame) -> _View | None:
@@ -38,7 +38,11 @@ class DenseKeyframeOdometry(ReferenceOdometry[_View]):
     LOST where there is no depth or the images do not meet.
     """
 
+    name = "dense_keyframe"
+    reads: tuple[str, ...] = ("dense", "feature", "keypoints", "seed")
+
     @classmethod
     def from_config(cls, config: Config) -> Self:
         """Build it from the settings."""
-        return cls(_Registrar(config), Reach(config.dense.keyframe_translation, config.dense.keyframe_rotation))
+        dense = config.section(DenseOdometry.name, DenseConfig)
+        return cls(_Registrar(config), Reach(dense.keyframe_translation, dense.keyframe_rotation))

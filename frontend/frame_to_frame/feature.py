@@ -5,10 +5,18 @@ from typing import Self
 
 import numpy as np
 
-from semslam.config import Config
+from semslam.config import Config, Section, setting
 from semslam.features import FeatureExtractor, match_descriptors, solve_pnp
 from semslam.frontend.frame_to_frame.reference import ReferenceOdometry, Registration
 from semslam.types import Features, FloatArray, Frame, Intrinsics
+
+
+class FeatureOdometryConfig(Section):
+    """ORB matches and PnP, frame to frame."""
+
+    min_inliers: int = setting(15, "matches that must be inliers of a motion", gt=5)
+    threshold_px: float = setting(3.0, "reprojection error up to which a match is an inlier", unit="px", gt=0)
+    covariance_scale: float = setting(10.0, "factor that calibrates the covariance", gt=0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -23,9 +31,9 @@ class FeatureRegistrar:
     """Registers frames to one another by matches and PnP."""
 
     def __init__(self, config: Config) -> None:
-        self._config = config.feature
+        self._config = config.section(FeatureOdometry.name, FeatureOdometryConfig)
         self._seed = config.seed
-        self._extractor = FeatureExtractor(config.features)
+        self._extractor = FeatureExtractor(config.keypoints)
 
     def prepare(self, frame: Frame) -> FeatureView | None:
         """Find keypoints; None where too few have depth."""
@@ -57,6 +65,10 @@ class FeatureOdometry(ReferenceOdometry[FeatureView]):
 
     LOST where too few matches agree on a motion.
     """
+
+    name = "feature"
+    reads: tuple[str, ...] = ("feature", "keypoints", "seed")
+    Settings = FeatureOdometryConfig
 
     @classmethod
     def from_config(cls, config: Config) -> Self:

@@ -13,6 +13,6 @@ def build_segmenter(config: Config) -> Segmenter:
         ConfigError: the name is unknown or a setting does not fit.
         ModelError: the network weights cannot be used.
     """
-    segmenter: Segmenter = load("semslam.segmenters", config.segmentation.name).from_config(config)
-    folder = config.segmentation.cache_dir
-    return CachedSegmenter(segmenter, folder) if folder is not None and segmenter.fingerprint else segmenter
+    if config.segmentation.cache_dir is not None:
+        return CachedSegmenter.from_config(config)
+    return load("semslam.segmenters", config.segmentation.name).from_config(config)

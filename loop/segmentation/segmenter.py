@@ -1,16 +1,28 @@
 """The role of a segmenter."""
 
-from typing import Protocol, runtime_checkable
+from typing import Protocol, Self, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
 
+from semslam.config import Config
 from semslam.types import LabelMap
 
 
 @runtime_checkable
 class Segmenter(Protocol):
-    """Gives each pixel of an image a class."""
+    """Gives each pixel of an image a class.
+
+    Attributes:
+        name: the registered name.
+    """
+
+    name: str
+
+    @classmethod
+    def from_config(cls, config: Config) -> Self:
+        """Build it from the settings."""
+        ...
 
     @property
     def names(self) -> tuple[str, ...]:

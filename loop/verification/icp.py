@@ -1,6 +1,6 @@
 """From a candidate to a constraint: a pose from features, refined on the clouds, behind gates."""
 
-from typing import Protocol, Self, runtime_checkable
+from typing import Self
 
 import numpy as np
 
@@ -27,14 +27,6 @@ MIN_SEEN = 0.05
 """Overlap below which they grow no more; the gates refuse such loops."""
 
 
-@runtime_checkable
-class LoopVerifier(Protocol):
-    """Decides by geometry whether two keyframes show the same place, and from where. Deterministic for a seed."""
-
-    def verify(self, query: Keyframe, match: Keyframe, candidate: LoopCandidate) -> LoopConstraint | LoopRejection:
-        """The relative pose with its covariance, or the first test that failed."""
-
-
 class IcpVerifier:
     """A first guess from features and one from semantic nodes, ICP, and gates that test what comes out.
 
@@ -45,6 +37,8 @@ class IcpVerifier:
     small residual, overlap seen from both sides, no points in space that the other view looked through, and a
     position that is determined.
     """
+
+    name = "icp"
 
     def __init__(self, config: VerificationConfig, seed: int) -> None:
         self._config = config

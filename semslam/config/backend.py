@@ -1,58 +1,57 @@
 """Settings of the back end."""
 
-from pydantic import Field
-
-from semslam.config.section import Section
+from semslam.config.section import Section, setting
 
 
 class BundleConfig(Section):
-    """Bundle adjustment of keyframes and landmarks after the closures."""
+    """Bundle adjustment of keyframes and landmarks after loop closure."""
 
-    rounds: int = Field(3, ge=0, description="adjustments, each without the outliers of the one before; 0 = none")
-    iterations: int = Field(5, gt=0, description="Levenberg-Marquardt steps of a round at the most")
-    max_observations: int = Field(250, gt=0, description="observations a keyframe needs; more are mostly left out")
-    pixel_sigma: float = Field(1.0, gt=0, description="pixels; error of a keypoint")
-    sighting_share: float = Field(
-        0.0625, gt=0, le=1, description="information of a sighting against an independent one; neighbours repeat errors"
+    rounds: int = setting(3, "adjustments, each without the outliers of the previous one; 0 = none", ge=0)
+    iterations: int = setting(5, "maximum number of Levenberg-Marquardt iterations of a round", gt=0)
+    max_observations: int = setting(250, "observations of a keyframe beyond which further ones are left out", gt=0)
+    pixel_sigma: float = setting(1.0, "standard deviation of a keypoint's position", unit="px", gt=0)
+    observation_share: float = setting(
+        0.0625,
+        "information of an observation, whose errors correlate, relative to an independent one",
+        gt=0,
+        le=1,
     )
-    disparity_weight: float = Field(0.5, gt=0, description="weight of depth, as a virtual disparity, against a pixel")
-    baseline: float = Field(0.08, gt=0, description="metres between the virtual stereo pair's cameras")
-    outlier: float = Field(2.8, gt=0, description="whitened reprojection error at which an observation is dropped")
-    closures: bool = Field(
-        True, description="where odometry keeps no landmarks, adjust by the features that closures share"
+    disparity_weight: float = setting(0.5, "weight of depth, as a virtual disparity, relative to a pixel", gt=0)
+    baseline: float = setting(0.08, "baseline of the virtual stereo pair", unit="m", gt=0)
+    outlier: float = setting(2.8, "whitened reprojection error above which an observation is an outlier", gt=0)
+    closures: bool = setting(
+        True, "adjust by the features that loop closures share where the odometry keeps no landmarks"
     )
-    min_views: int = Field(
-        3, gt=1, description="keyframes that must see a landmark; of two neighbours odometry says the same"
-    )
+    min_views: int = setting(3, "minimum number of keyframes that observe a landmark", gt=1)
 
 
 class CovisibilityConfig(Section):
-    """Between-factors of keyframes that see the same landmarks."""
+    """Between factors of keyframes that observe the same landmarks."""
 
-    neighbours: int = Field(2, ge=0, description="older keyframes that each is bound to, besides the last; 0 = off")
-    min_shared: int = Field(30, ge=6, description="landmarks that both must see, and that must agree on the pose")
-    inflation: float = Field(100.0, gt=0, description="factor on the formal variance: neighbours repeat their errors")
+    neighbours: int = setting(2, "earlier keyframes that each is connected to, besides the previous one; 0 = off", ge=0)
+    min_shared: int = setting(30, "common landmarks that must agree on the relative pose", ge=6)
+    inflation: float = setting(100.0, "factor on the formal variance, for correlated errors", gt=0)
 
 
 class BackendConfig(Section):
-    """The pose graph's optimisation."""
+    """Pose graph optimisation."""
 
-    robust: str = Field("gnc", description="how false loops are held off: gnc, pcm, dcs, cauchy, huber or none")
-    max_residual: float = Field(
-        4.7, gt=0, description="Mahalanobis distance at which a loop is taken for false; 4.7 = 99.9 % of true ones"
+    robust: str = setting("gnc", "registered robust strategy")
+    max_residual: float = setting(
+        4.7, "Mahalanobis distance above which a loop is an outlier; 4.7 keeps 99.9 % of true loops", gt=0
     )
-    max_iterations: int = Field(100, gt=0, description="Levenberg-Marquardt steps at the most")
-    drift_slack: float = Field(
-        1.5, ge=0, description="times max_residual that a loop may lie from odometry alone; 0 = no such test"
+    max_iterations: int = setting(100, "maximum number of Levenberg-Marquardt iterations", gt=0)
+    drift_slack: float = setting(
+        1.5, "factor on max_residual for a loop's distance from odometry alone; 0 = no such test", ge=0
     )
-    max_odometry_scale: float = Field(
-        10.0, ge=1, description="how far odometry's deviations may be widened where most loops contradict them"
+    max_odometry_scale: float = setting(
+        10.0, "maximum factor on odometry's standard deviations where most loops contradict them", ge=1
     )
-    contribution_limit: int = Field(
-        100_000, ge=0, description="keyframes times accepted loops up to which each loop is left out once; 0 = never"
+    contribution_limit: int = setting(
+        100_000, "keyframes times accepted loops up to which each loop is left out in turn; 0 = never", ge=0
     )
-    max_loop_scale: float = Field(
-        3.0, ge=1, description="how far the loops' deviations may be widened where neighbouring ones disagree"
+    max_loop_scale: float = setting(
+        3.0, "maximum factor on the loops' standard deviations where neighbouring loops disagree", ge=1
     )
     covisibility: CovisibilityConfig = CovisibilityConfig()
     bundle: BundleConfig = BundleConfig()

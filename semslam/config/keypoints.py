@@ -1,18 +1,16 @@
-"""Settings of the keypoints that front end and verification share."""
+"""Settings of keypoints, which front end and verification share."""
 
-from pydantic import Field
-
-from semslam.config.section import Section
+from semslam.config.section import Section, setting
 
 
-class FeatureConfig(Section):
-    """Keypoints and their matching, shared by the front end and the verification."""
+class KeypointConfig(Section):
+    """ORB keypoints and where their depth is used."""
 
-    count: int = Field(1000, gt=0, description="keypoints per image at the most")
-    levels: int = Field(8, gt=0, description="pyramid levels")
-    scale: float = Field(1.2, gt=1, description="scale between levels")
-    fast_threshold: int = Field(12, gt=0, description="FAST corner threshold")
-    cell: int = Field(32, gt=0, description="pixels; side of the cells over which keypoints are spread")
-    per_cell: int = Field(6, gt=0, description="keypoints a cell keeps")
-    min_depth: float = Field(0.2, ge=0, description="metres; nearer depth is not used")
-    max_depth: float = Field(6.0, gt=0, description="metres; farther depth is not used")
+    count: int = setting(1000, "maximum number of keypoints in an image", gt=0, le=100_000)
+    levels: int = setting(8, "pyramid levels", gt=0, le=32)
+    scale: float = setting(1.2, "scale factor between pyramid levels", gt=1, le=4)
+    fast_threshold: int = setting(12, "FAST corner threshold", unit="grey levels", gt=0, le=255)
+    cell: int = setting(32, "side of the grid cells over which keypoints are spread", unit="px", gt=0)
+    per_cell: int = setting(6, "maximum number of keypoints in a cell", gt=0)
+    min_depth: float = setting(0.2, "depth below which a measurement is ignored", unit="m", ge=0)
+    max_depth: float = setting(6.0, "depth above which a measurement is ignored", unit="m", gt=0)

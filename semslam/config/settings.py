@@ -1,161 +1,179 @@
-"""All settings joined in ``Config``: read from YAML, overridden, dumped."""
+"""All settings joined in ``Config``."""
 
-import warnings
 from collections.abc import Mapping
-from pathlib import Path
+from functools import lru_cache
 from typing import Any, Self, TypeVar
 
 import yaml
-from pydantic import Field, ValidationError
-from pydantic_core import ErrorDetails
+from pydantic import ConfigDict, Field, ValidationError, model_validator
+from pydantic_core import InitErrorDetails, PydanticCustomError
 
+from semslam import plugins
 from semslam.config.backend import BackendConfig
 from semslam.config.dataset import DatasetConfig
-from semslam.config.detection import (
-    Conv3Config,
-    DbowConfig,
-    FusedConfig,
-    LoopConfig,
-    PaperSemanticConfig,
-    SemanticConfig,
-)
-from semslam.config.features import FeatureConfig
-from semslam.config.frontend import DenseConfig, FeatureMapConfig, FeatureOdometryConfig, KeyframeConfig, KissConfig
-from semslam.config.section import Section
+from semslam.config.keyframes import KeyframeConfig
+from semslam.config.keypoints import KeypointConfig
+from semslam.config.loops import LoopConfig
+from semslam.config.section import Section, setting
 from semslam.config.segmentation import SegmentationConfig, TrainingConfig
 from semslam.config.verification import VerificationConfig
-from semslam.errors import ConfigError, SemslamWarning
+from semslam.errors import ConfigError
+
+SectionT = TypeVar("SectionT", bound=Section)
 
 
 class Config(Section):
-    """Everything that decides a run besides the images."""
+    """Everything that decides a run besides the images.
 
-    seed: int = Field(0, ge=0, description="seed of everything that draws random numbers")
-    odometry: str = Field("feature_map", description="registered odometry")
-    detector: str = Field("fused", description="registered loop detector")
+    Further sections belong to implementations (an odometry, a detector, ...) and are called like them; ``section``
+    gives them to their owner.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="allow")
+
+    seed: int = setting(0, "seed of everything that draws random numbers", ge=0, lt=2**31)
+    odometry: str = setting("feature_map", "registered odometry")
+    detector: str = setting("fused", "registered loop detector; 'none' = no loops")
     dataset: DatasetConfig = DatasetConfig()
-    features: FeatureConfig = FeatureConfig()
+    keypoints: KeypointConfig = KeypointConfig()
     keyframes: KeyframeConfig = KeyframeConfig()
-    feature: FeatureOdometryConfig = FeatureOdometryConfig()
-    feature_map: FeatureMapConfig = FeatureMapConfig()
-    dense: DenseConfig = DenseConfig()
-    kiss: KissConfig = KissConfig()
     segmentation: SegmentationConfig = SegmentationConfig()
     training: TrainingConfig = TrainingConfig()
     loops: LoopConfig = LoopConfig()
-    semantic: SemanticConfig = SemanticConfig()
-    semantic_paper: PaperSemanticConfig = PaperSemanticConfig()
-    fused: FusedConfig = FusedConfig()
-    dbow: DbowConfig = DbowConfig()
-    conv3: Conv3Config = Conv3Config()
     verification: VerificationConfig = VerificationConfig()
     backend: BackendConfig = BackendConfig()
-    plugins: dict[str, dict[str, Any]] = Field({}, description="settings of outside plug-ins, by plug-in name")
+    plugins: dict[str, dict[str, Any]] = Field(
+        {}, description="settings, by name, of outside implementations that declare none"
+    )
+
+    @model_validator(mode="after")
+    def _read_own_sections(self) -> Self:
+        """Give each further section the type that its implementation declares; those at default are left out."""
+        extra = self.__pydantic_extra__ or {}
+        for name, value in list(extra.items()):
+            kind = own_settings(name)
+            if kind is None:
+                raise _unknown(name, value)
+            section = value if isinstance(value, kind) else _checked(kind, name, value)
+            if section == kind():
+                del extra[name]
+            else:
+                extra[name] = section
+        return self
+
+    def section(self, name: str, kind: type[SectionT]) -> SectionT:
+        """An implementation's own settings.
+
+        Args:
+            name: the registered name.
+            kind: its ``Settings``.
+        """
+        section = (self.__pydantic_extra__ or {}).get(plugins.section_name(name))
+        return section if isinstance(section, kind) else kind()
 
     def with_changes(self, **changes: Any) -> Self:
         """A copy with top-level fields or whole sections replaced, checked again.
 
         Raises:
-            ConfigError: a key or value is not known.
+            ConfigError: a key, a value or a name is not known.
         """
-        return _validated(type(self), _merged(self.model_dump(), changes))
+        config = validated(type(self), merged(self.model_dump(), changes))
+        config.check_names()
+        return config
+
+    def check_names(self) -> None:
+        """Make sure that everything named here is registered.
+
+        Raises:
+            ConfigError: a name is unknown; the message lists the known ones.
+        """
+        plugins.check("semslam.odometry", self.odometry)
+        plugins.check("semslam.detectors", self.detector)
+        plugins.check("semslam.segmenters", self.segmentation.name)
+        plugins.check("semslam.verifiers", self.verification.name)
+        plugins.check("semslam.robust", self.backend.robust)
+        if self.dataset.loader is not None:
+            plugins.check("semslam.datasets", self.dataset.loader)
+
+    def with_all_sections(self) -> dict[str, Section]:
+        """All sections by name, those of all registered implementations included."""
+        fixed = {name: getattr(self, name) for name in type(self).model_fields}
+        sections = {name: value for name, value in fixed.items() if isinstance(value, Section)}
+        for group in plugins.GROUPS:
+            for known in plugins.names(group):
+                name = plugins.section_name(known)
+                kind = None if name in sections else own_settings(name)
+                if kind is not None:
+                    sections[name] = self.section(name, kind)
+        return sections
+
+    def nested(self) -> dict[str, Any]:
+        """The effective settings as nested plain values, as they stand in YAML."""
+        values = self.model_dump(mode="json", include=set(type(self).model_fields))
+        return values | {name: section.model_dump(mode="json") for name, section in self.with_all_sections().items()}
 
     def dump(self) -> str:
         """The effective settings as YAML, readable by ``load_config``."""
-        return yaml.safe_dump(self.model_dump(mode="json"), sort_keys=False)
+        return yaml.safe_dump(self.nested(), sort_keys=False)
+
+
+@lru_cache(maxsize=256)
+def own_settings(name: str) -> type[Section] | None:
+    """The settings that an implementation declares as the section ``name``, or None where none does."""
+    for group, known in plugins.named(name):
+        try:
+            declared = vars(plugins.load(group, known)).get("Settings")
+        except ConfigError:  # a broken plug-in has been warned of, and must not stop a run that does without it
+            continue
+        if isinstance(declared, type) and issubclass(declared, Section):
+            return declared
+    return None
+
+
+def merged(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Nested values with ``changes`` over them."""
+    together = dict(base)
+    for key, change in changes.items():
+        value = change.model_dump() if isinstance(change, Section) else change
+        inside = together.get(key)
+        together[key] = merged(inside, value) if isinstance(inside, dict) and isinstance(value, Mapping) else value
+    return together
 
 
 ConfigT = TypeVar("ConfigT", bound=Config)
 
 
-def load_config(path: Path | None = None, overrides: Mapping[str, Any] | None = None) -> Config:
-    """Read a YAML file (or the defaults) and lay nested ``overrides`` over it.
+def validated(model: type[ConfigT], values: Mapping[str, Any]) -> ConfigT:
+    """Settings from nested values.
 
     Raises:
-        ConfigError: the file cannot be read, or a key or value is not known.
+        ConfigError: a key or value is not known.
     """
-    values = {} if path is None else _read(path)
-    return _validated(Config, _merged(_merged(Config().model_dump(), values), overrides or {}))
-
-
-def load_saved_config(path: Path) -> Config:
-    """Read the settings that an earlier run wrote; what is no setting any more is left out with a warning.
-
-    Raises:
-        ConfigError: the file cannot be read, or a value is not allowed any more.
-    """
-    values = _read(path)
-    gone = [error["loc"] for error in _complaints(values) if error["type"] == "extra_forbidden"]
-    for *sections, key in gone:
-        inside = values
-        for section in sections:
-            inside = inside[section]
-        del inside[key]
-    if gone:
-        names = ", ".join(".".join(map(str, place)) for place in gone)
-        sentence = f"{path} is of another version; left out, being no settings now: {names}."
-        warnings.warn(sentence, SemslamWarning, stacklevel=2)
-    return _validated(Config, _merged(Config().model_dump(), values))
-
-
-def parse_overrides(settings: list[str]) -> dict[str, Any]:
-    """Turn ``section.key=value`` texts (values in YAML) into a nested dict.
-
-    Raises:
-        ConfigError: a text has no '=' or a value is not YAML.
-    """
-    nested: dict[str, Any] = {}
-    for setting in settings:
-        dotted, equals, text = setting.partition("=")
-        if not equals:
-            raise ConfigError(f"A setting is written section.key=value, not '{setting}'.")
-        try:
-            value = yaml.safe_load(text)
-        except yaml.YAMLError as error:
-            raise ConfigError(f"The value in '{setting}' is not readable.") from error
-        *sections, key = dotted.strip().split(".")
-        node = nested
-        for section in sections:
-            node = node.setdefault(section, {})
-        node[key] = value
-    return nested
-
-
-def _read(path: Path) -> dict[Any, Any]:
-    try:
-        values = yaml.safe_load(path.read_text(encoding="utf-8")) or {}
-    except (OSError, UnicodeDecodeError) as error:
-        raise ConfigError(f"The settings file {path} cannot be read: {error}.") from error
-    except yaml.YAMLError as error:
-        raise ConfigError(f"The settings file {path} is not YAML: {' '.join(str(error).split())}.") from error
-    if not isinstance(values, dict):
-        raise ConfigError(f"The settings file {path} must hold 'key: value' pairs.")
-    return values
-
-
-def _complaints(values: Mapping[str, Any]) -> list[ErrorDetails]:
-    try:
-        Config.model_validate(values)
-    except ValidationError as error:
-        return error.errors()
-    return []
-
-
-def _merged(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
-    merged = dict(base)
-    for key, change in changes.items():
-        value = change.model_dump() if isinstance(change, Section) else change
-        inside = merged.get(key)
-        merged[key] = _merged(inside, value) if isinstance(inside, dict) and isinstance(value, Mapping) else value
-    return merged
-
-
-def _validated(model: type[ConfigT], values: Mapping[str, Any]) -> ConfigT:
     try:
         return model.model_validate(values)
     except ValidationError as error:
-        first = error.errors()[0]
+        first = error.errors(include_url=False)[0]
         where = ".".join(str(part) for part in first["loc"]) or "settings"
         if first["type"] == "extra_forbidden":
             raise ConfigError(f"There is no setting '{where}' (see 'semslam config' for all of them).") from error
         raise ConfigError(f"Setting '{where}': {first['msg'].lower()}, not {first['input']!r}.") from error
+
+
+def _checked(kind: type[Section], name: str, value: Any) -> Section:
+    try:
+        return kind.model_validate(merged(kind().model_dump(), value) if isinstance(value, Mapping) else value)
+    except ValidationError as error:
+        places = [
+            InitErrorDetails(
+                type=PydanticCustomError(e["type"], "{sentence}", {"sentence": e["msg"]}),
+                loc=(name, *e["loc"]),
+                input=e["input"],
+            )
+            for e in error.errors(include_url=False)
+        ]
+        raise ValidationError.from_exception_data("Config", places) from error
+
+
+def _unknown(name: str, value: Any) -> ValidationError:
+    complaint = PydanticCustomError("extra_forbidden", "Extra inputs are not permitted")
+    return ValidationError.from_exception_data("Config", [InitErrorDetails(type=complaint, loc=(name,), input=value)])

@@ -2,35 +2,36 @@
 
 from typing import Literal
 
-from pydantic import Field
-
-from semslam.config.features import FeatureConfig
-from semslam.config.section import Section
+from semslam.config.keypoints import KeypointConfig
+from semslam.config.section import Section, setting
 
 
 class VerificationConfig(Section):
-    """Gates between a candidate and a constraint."""
+    """Thresholds between a candidate and a constraint."""
 
-    features: FeatureConfig = FeatureConfig(count=2000, per_cell=12)
-    min_inliers: int = Field(20, gt=5, description="feature matches that must agree on the pose")
-    min_first_inliers: int = Field(
-        8, gt=5, description="matches that must agree on it before they are looked for there"
+    name: str = setting("icp", "registered loop verifier")
+    keypoints: KeypointConfig = KeypointConfig(count=2000, per_cell=12)
+    min_inliers: int = setting(20, "feature matches that must be inliers of the relative pose", gt=5)
+    min_first_inliers: int = setting(8, "PnP inliers of an initial guess that is worth refining", gt=5)
+    match_ratio: float = setting(0.9, "ratio test: distance of the best match over that of the second best", gt=0, le=1)
+    max_reprojection: float = setting(3.0, "reprojection error up to which a match is an inlier", unit="px", gt=0)
+    min_points: int = setting(100, "minimum number of points of each cloud", gt=5)
+    icp: Literal["point_to_plane", "generalized", "colored"] = setting("point_to_plane", "kind of ICP")
+    search_distances: tuple[float, ...] = setting(
+        (0.3, 0.1), "correspondence distance of each ICP pass while few features are inliers", unit="m"
     )
-    match_ratio: float = Field(0.9, gt=0, le=1, description="a match's distance over that of the second best, at most")
-    max_reprojection: float = Field(3.0, gt=0, description="pixels within which a match agrees with a pose")
-    min_points: int = Field(100, gt=5, description="points that both clouds must have")
-    icp: Literal["point_to_plane", "generalized", "colored"] = Field("point_to_plane", description="kind of ICP")
-    search_distances: tuple[float, ...] = Field((0.3, 0.1), description="metres, the same where few features agree yet")
-    icp_distances: tuple[float, ...] = Field((0.1, 0.05), description="metres, correspondence limit of each ICP pass")
-    max_shift: float = Field(20.0, gt=0, description="pixels, median, by which ICP may move the agreeing matches")
-    fit_distance: float = Field(0.05, gt=0, description="metres within which a point meets the other surface")
-    min_fitness: float = Field(0.25, ge=0, le=1, description="share of the query's points on the match's surface")
-    max_rmse: float = Field(0.035, gt=0, description="metres, over those points")
-    overlap_distance: float = Field(0.1, gt=0, description="metres within which a point counts as seen by the other")
-    min_overlap: float = Field(0.15, ge=0, le=1, description="share of either view that the other must see")
-    max_free_space: float = Field(0.1, ge=0, le=1, description="share of points that may stand in seen-through space")
-    max_sigma: float = Field(0.25, gt=0, description="metres, standard deviation of the position at the most")
-    icp_inflation: float = Field(50.0, gt=0, description="factor on ICP's formal variance: points err together")
-    pnp_inflation: float = Field(30.0, gt=0, description="factor on PnP's formal variance")
-    sigma_rotation: float = Field(0.012, ge=0, description="radians, error that no formal variance knows of")
-    sigma_translation: float = Field(0.012, ge=0, description="metres, the same; both at full overlap")
+    icp_distances: tuple[float, ...] = setting((0.1, 0.05), "correspondence distance of each ICP pass", unit="m")
+    max_shift: float = setting(20.0, "median reprojection shift of the inliers that ICP may cause", unit="px", gt=0)
+    fit_distance: float = setting(
+        0.05, "distance to the other surface up to which a point is an inlier", unit="m", gt=0
+    )
+    min_fitness: float = setting(0.25, "share of the query's points that must be inliers", ge=0, le=1)
+    max_rmse: float = setting(0.035, "maximum root mean square distance of the inliers", unit="m", gt=0)
+    overlap_distance: float = setting(0.1, "distance up to which a point counts as overlapping", unit="m", gt=0)
+    min_overlap: float = setting(0.15, "overlap that either cloud must have with the other", ge=0, le=1)
+    max_free_space: float = setting(0.1, "share of points that may lie in the other view's free space", ge=0, le=1)
+    max_sigma: float = setting(0.25, "maximum standard deviation of the relative position", unit="m", gt=0)
+    icp_inflation: float = setting(50.0, "factor on ICP's formal variance, for correlated errors of its points", gt=0)
+    pnp_inflation: float = setting(30.0, "factor on PnP's formal variance", gt=0)
+    sigma_rotation: float = setting(0.012, "systematic rotation error at full overlap", unit="rad", ge=0)
+    sigma_translation: float = setting(0.012, "systematic translation error at full overlap", unit="m", ge=0)

@@ -13,7 +13,6 @@ from semslam.errors import ConfigError, DatasetError
 
 __all__ = ["Dataset", "DatasetLoader", "open_dataset"]
 
-GROUP = "semslam.datasets"
 SYNTHETIC = "synthetic"
 
 
@@ -36,7 +35,7 @@ def open_dataset(path: str | Path, config: DatasetConfig | None = None, *, loade
     config = config or DatasetConfig()
     try:
         name = loader or config.loader or guess_loader(path)
-        dataset: Dataset = plugins.load(GROUP, name).open(path, config)
+        dataset: Dataset = plugins.load("semslam.datasets", name).open(path, config)
     except OSError as error:
         raise DatasetError(f"{path} cannot be read: {error.strerror or error}.") from error
     if config.faults != type(config.faults)():
@@ -65,11 +64,11 @@ def guess_loader(path: str | Path) -> str:
             return SYNTHETIC
         raise DatasetError(f"There is no folder or file {place}.")
     looked_for = []
-    for name in plugins.names(GROUP):
+    for name in plugins.names("semslam.datasets"):
         if name == SYNTHETIC:
             continue
         try:
-            loader: type[DatasetLoader] = plugins.load(GROUP, name)
+            loader: type[DatasetLoader] = plugins.load("semslam.datasets", name)
         except ConfigError:  # a broken plug-in has been warned of; it must not keep the others from being asked
             continue
         if loader.recognises(place):

@@ -10,7 +10,7 @@ from semslam.config import Config
 from semslam.datasets.dataset import Dataset
 from semslam.datasets.prefetch import prefetch
 from semslam.errors import DatasetError
-from semslam.loop.verification.verification import LoopVerifier
+from semslam.loop.verification.verifier import LoopVerifier
 from semslam.runs.ledger import LedgerEntry
 from semslam.runs.metrics import Metrics, TimeMetrics
 from semslam.runs.recording import RecordedFrame, Recording, checksum

@@ -2,7 +2,7 @@
 
 import zipfile
 import zlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,21 +14,14 @@ from semslam.config import Config, load_saved_config
 from semslam.datasets.dataset import Dataset
 from semslam.errors import ConfigError, DatasetError, ResultsError
 from semslam.geometry.se3 import is_rigid
+from semslam.plugins import load
 from semslam.types import Frame, Motion, Observations, TrackingStatus
 
 Arrays = dict[str, npt.NDArray[Any]]
 RECORDING, SOURCE = "frontend.npz", "sequence.txt"
 
-FIXED: dict[str, Any] = {
-    "odometry": True,
-    "dataset": True,
-    "feature": True,
-    "feature_map": True,
-    "dense": True,
-    "kiss": True,
-    "keyframes": {"interval": True, "max_translation": True, "max_rotation": True},
-}
-"""Settings that a replay cannot change: they decide the motions and which frames are keyframes."""
+FIXED = ("odometry", "dataset", "keyframes.interval", "keyframes.max_translation", "keyframes.max_rotation")
+"""Settings that no replay can change, since they decide which frames are read and become keyframes."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -91,10 +84,20 @@ class SavedFrontEnd:
         Raises:
             ConfigError: a setting of the front end differs.
         """
-        before, after = (config.model_dump(include=FIXED) for config in (self.config, wanted))
-        changed = [name for name in FIXED if before[name] != after[name]]
-        if changed:
-            raise ConfigError(f"'{changed[0]}' decides the front end, which a replay takes from the saved run.")
+        name = self.config.odometry
+        decisive = (*FIXED, *load("semslam.odometry", name).reads, f"plugins.{name}")
+        before, after = self.config.nested(), wanted.nested()
+        changed = next((setting for setting in decisive if _value(before, setting) != _value(after, setting)), None)
+        if changed is not None:
+            raise ConfigError(f"The setting '{changed}' decides the odometry, which a replay takes from the saved run.")
+
+
+def _value(settings: Mapping[str, Any], dotted: str) -> Any:
+    """What stands at a dotted place of nested settings, or None."""
+    place: Any = settings
+    for key in dotted.split("."):
+        place = place.get(key) if isinstance(place, Mapping) else None
+    return place
 
 
 def checksum(frame: Frame) -> int:

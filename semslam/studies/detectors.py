@@ -96,7 +96,7 @@ def keyframe_views(
     """
     odometry = plugins.load("semslam.odometry", config.odometry).from_config(config)
     segmenter = build_segmenter(config) if needs_labels else None
-    extractor, details = FeatureExtractor(config.features), FeatureExtractor(config.verification.features)
+    extractor, details = FeatureExtractor(config.keypoints), FeatureExtractor(config.verification.keypoints)
     T_odom_cam = np.eye(4)
     count = 0
     for index, frame in enumerate(prefetch(dataset)):

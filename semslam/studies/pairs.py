@@ -26,6 +26,7 @@ from semslam.eval.trajectory import poses_at
 from semslam.features import FeatureExtractor
 from semslam.frontend.keyframes import make_keyframe
 from semslam.geometry.se3 import FloatArray, invert
+from semslam.loop.detectors.fused.detector import FusedConfig
 from semslam.loop.segmentation.build import build_segmenter
 from semslam.studies.detectors import PROBABILISTIC, check_scorable, exhaustive_detector
 from semslam.types import Frame, KeyframeView
@@ -103,7 +104,7 @@ def try_pairs(
 
     folders = [scored(folder.name, read_pair_folder(folder)) for folder in plan.folders]
     tested = (*map(of_sequence, plan.sequences), *folders)
-    own = {PROBABILISTIC: config.fused.min_probability}
+    own = {PROBABILISTIC: config.section(PROBABILISTIC, FusedConfig).min_probability}
     thresholds = find_thresholds(tested, [of_sequence(path) for path in plan.tuning_sequences], own)
     return PairTrial(tested, thresholds, tuple(judge_pairs(tested, thresholds)))
 
@@ -163,7 +164,7 @@ def _scores(
 ) -> dict[str, FloatArray]:
     detectors = {name: exhaustive_detector(name, config, len(pairs)) for name in names}
     segmenter = build_segmenter(config) if any(d.needs_labels for d in detectors.values()) else None
-    extractor = FeatureExtractor(config.features)
+    extractor = FeatureExtractor(config.keypoints)
 
     def make(identity: int, frame: Frame, T_world_cam: FloatArray) -> KeyframeView:
         report(title, identity, 2 * len(pairs))

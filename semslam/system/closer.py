@@ -21,7 +21,7 @@ from semslam.geometry.se3 import FloatArray, adjoint, invert
 from semslam.loop.detector import LoopDetector
 from semslam.loop.segmentation.build import build_segmenter
 from semslam.loop.segmentation.segmenter import Segmenter
-from semslam.loop.verification.verification import IcpVerifier, LoopVerifier
+from semslam.loop.verification.verifier import LoopVerifier, build_verifier
 from semslam.types import Frame, Intrinsics, Keyframe, KeyframeView, LabelMap, LoopConstraint
 
 Noise = Callable[[LoopConstraint], gtsam.noiseModel.Base]
@@ -86,9 +86,9 @@ class LoopCloser:
         self._segmenter: Segmenter | None = None
         if self._detector.needs_labels:
             self._segmenter = build_segmenter(self._config)
-        self._verifier = verifier or IcpVerifier.from_config(self._config)
-        self._extractor = FeatureExtractor(self._config.features)
-        self._details = FeatureExtractor(self._config.verification.features)
+        self._verifier = verifier or build_verifier(self._config)
+        self._extractor = FeatureExtractor(self._config.keypoints)
+        self._details = FeatureExtractor(self._config.verification.keypoints)
         self._keys: list[int] = []
         self._keyframes: list[Keyframe] = []
         self._closures: list[Closure] = []

@@ -19,7 +19,7 @@ from semslam.loop.detector import LoopDetector, NoLoops
 from semslam.loop.following import LoopFollower
 from semslam.loop.segmentation.build import build_segmenter
 from semslam.loop.segmentation.segmenter import Segmenter
-from semslam.loop.verification.verification import IcpVerifier, LoopVerifier
+from semslam.loop.verification.verifier import LoopVerifier, build_verifier
 from semslam.runtime.stopwatch import Stopwatch
 from semslam.system.recovery import recover_poses
 from semslam.system.refinement import refine
@@ -143,8 +143,8 @@ class Slam:
         self._graph = graph
         self._config = config
         self._stopwatch = stopwatch
-        self._extractor = FeatureExtractor(config.features)
-        self._details = FeatureExtractor(config.verification.features)
+        self._extractor = FeatureExtractor(config.keypoints)
+        self._details = FeatureExtractor(config.verification.keypoints)
         self._policy = KeyframePolicy(config.keyframes)
         self._follower = LoopFollower(config.loops)
         self._T_odom_cam: FloatArray = np.eye(4)
@@ -170,7 +170,7 @@ class Slam:
             odometry=plugins.load("semslam.odometry", config.odometry).from_config(config),
             segmenter=build_segmenter(config) if detector.needs_labels else None,
             detector=detector,
-            verifier=verifier or IcpVerifier.from_config(config),
+            verifier=verifier or build_verifier(config),
             graph=PoseGraph(config.backend),
             config=config,
             stopwatch=stopwatch or Stopwatch(),

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from semslam.config import Config
-from semslam.frontend.kiss import KissOdometry
+from semslam.frontend.kiss import KissConfig, KissOdometry
 from semslam.frontend.prediction import RecentVelocity
 from semslam.geometry.se3 import exp_so3, make_transform
 
@@ -16,7 +15,7 @@ def plane(normal_axis, offset, rng, count=600):
 
 
 def covariance(points):
-    return KissOdometry(Config())._covariance(points, np.zeros(6))
+    return KissOdometry(KissConfig())._covariance(points, np.zeros(6))
 
 
 def test_a_wall_leaves_the_directions_along_it_uncertain():

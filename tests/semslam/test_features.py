@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from semslam.config import FeatureConfig
+from semslam.config import KeypointConfig
 from semslam.datasets import open_dataset
 from semslam.features import FeatureExtractor, hamming_distances, match_descriptors, solve_pnp
 from semslam.geometry.camera import Intrinsics
@@ -25,7 +25,7 @@ def noise_frame(camera: Intrinsics, depth: float = 2.0) -> Frame:
 
 
 def extract(frame: Frame, **settings: float) -> Features:
-    return FeatureExtractor(FeatureConfig(**settings)).extract(frame)  # type: ignore[arg-type]
+    return FeatureExtractor(KeypointConfig(**settings)).extract(frame)  # type: ignore[arg-type]
 
 
 def test_keypoints_are_spread_over_cells() -> None:

@@ -4,12 +4,19 @@ from typing import Self
 
 import numpy as np
 
-from semslam.config import Config, DbowConfig, LoopConfig
+from semslam.config import Config, LoopConfig, Section, setting
 from semslam.loop.detectors.bag_of_words.vocabulary import Vocabulary, load_vocabulary
 from semslam.loop.detectors.bag_of_words.word_index import Bag, WordIndex
 from semslam.loop.detectors.common.memo import LastView
 from semslam.loop.detectors.common.timeline import Timeline
 from semslam.types import FloatArray, KeyframeView, LoopCandidate, LoopEvidence, UInt8Array
+
+
+class DbowConfig(Section):
+    """How scores of neighbouring keyframes are grouped."""
+
+    group: float = setting(0.35, "keyframes within this time are scored together", unit="s", ge=0)
+    min_score: float = setting(0.04, "score of a candidate", ge=0, le=1)
 
 
 class DbowDetector:
@@ -22,6 +29,7 @@ class DbowDetector:
 
     name = "dbow"
     needs_labels = False
+    Settings = DbowConfig
 
     def __init__(self, vocabulary: Vocabulary, config: DbowConfig, loops: LoopConfig) -> None:
         self._vocabulary = vocabulary
@@ -37,7 +45,7 @@ class DbowDetector:
         Raises:
             ModelError: the shipped vocabulary is missing or damaged.
         """
-        return cls(load_vocabulary(), config.dbow, config.loops)
+        return cls(load_vocabulary(), config.section(cls.name, cls.Settings), config.loops)
 
     def query(self, view: KeyframeView) -> list[LoopCandidate]:
         """Candidates by grouped score."""

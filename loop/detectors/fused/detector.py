@@ -6,7 +6,7 @@ from typing import Self
 import cv2
 import numpy as np
 
-from semslam.config import Config, FusedConfig, LoopConfig
+from semslam.config import Config, LoopConfig, Section, setting
 from semslam.errors import ConfigError
 from semslam.loop.detectors.bag_of_words.detector import make_bag
 from semslam.loop.detectors.bag_of_words.vocabulary import Vocabulary, load_vocabulary
@@ -23,6 +23,14 @@ from semslam.loop.segmentation.decoding import shrink
 from semslam.types import Float32Array, FloatArray, KeyframeView, LoopCandidate, LoopEvidence, UInt8Array
 
 MIDDLE_CHANNELS = 96
+
+
+class FusedConfig(Section):
+    """Which probabilities make a candidate."""
+
+    min_probability: float = setting(0.5, "probability of the same place that makes a candidate", ge=0, le=1)
+    word_share: float = setting(0.4, "share of the candidates chosen by words alone", ge=0, lt=1)
+    min_word_probability: float = setting(0.05, "probability that those need", ge=0, le=1)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,6 +60,7 @@ class FusedDetector:
 
     name = "fused"
     needs_labels = True
+    Settings = FusedConfig
 
     def __init__(
         self, backbone: Backbone, vocabulary: Vocabulary, model: FusionModel, config: FusedConfig, loops: LoopConfig
@@ -73,7 +82,8 @@ class FusedDetector:
             ModelError: weights are missing or damaged.
         """
         backbone = Backbone.from_config(config)
-        return cls(backbone, load_vocabulary(), load_fusion(), config.fused, config.loops)
+        own = config.section(cls.name, cls.Settings)
+        return cls(backbone, load_vocabulary(), load_fusion(), own, config.loops)
 
     def query(self, view: KeyframeView) -> list[LoopCandidate]:
         """Candidates by probability, with the share of each part and the labels in common.

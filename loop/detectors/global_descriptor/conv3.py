@@ -5,7 +5,7 @@ from typing import Protocol, Self
 
 import numpy as np
 
-from semslam.config import Config, LoopConfig
+from semslam.config import Config, LoopConfig, Section, setting
 from semslam.loop.detectors.common.backbone import Backbone
 from semslam.loop.detectors.common.weight_file import open_weights
 from semslam.loop.detectors.global_descriptor.descriptor import DescriptorDetector
@@ -13,6 +13,12 @@ from semslam.types import Float32Array, KeyframeView, UInt8Array
 
 SHIPPED = Path(__file__).parents[2] / "weights" / "encoder_map.npz"
 """What was learned of the shipped encoder: the score that makes a candidate."""
+
+
+class Conv3Config(Section):
+    """Which network the features come from."""
+
+    alexnet: Path | None = setting(None, "torchvision's AlexNet weights; none = the shipped encoder")
 
 
 class FeatureMap(Protocol):
@@ -39,6 +45,7 @@ class Conv3Detector(DescriptorDetector):
     """
 
     name = "conv3"
+    Settings = Conv3Config
 
     def __init__(self, loops: LoopConfig, features: FeatureMap) -> None:
         super().__init__(loops, features.min_score)
@@ -51,11 +58,12 @@ class Conv3Detector(DescriptorDetector):
         Raises:
             ModelError: the weights are missing or damaged.
         """
-        if config.conv3.alexnet is None:
+        weights = config.section(cls.name, cls.Settings).alexnet
+        if weights is None:
             return cls(config.loops, EncoderMap(Backbone.from_config(config), load_min_score()))
         from semslam.loop.detectors.global_descriptor.alexnet import AlexNetMap
 
-        return cls(config.loops, AlexNetMap.load(config.conv3.alexnet))
+        return cls(config.loops, AlexNetMap.load(weights))
 
     @property
     def features_from(self) -> str:

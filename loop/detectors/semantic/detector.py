@@ -6,12 +6,19 @@ from typing import Self
 import numpy as np
 import numpy.typing as npt
 
-from semslam.config import Config, DistanceReading, LoopConfig, MatchReading, SemanticConfig, ShareReading
+from semslam.config import Config, LoopConfig
 from semslam.errors import ConfigError
 from semslam.loop.detectors.common.growing import GrowingArray
 from semslam.loop.detectors.common.memo import LastView
 from semslam.loop.detectors.common.timeline import Timeline
 from semslam.loop.detectors.semantic.nodes import SemanticNodes, extract_nodes
+from semslam.loop.detectors.semantic.settings import (
+    DistanceReading,
+    MatchReading,
+    PaperSemanticConfig,
+    SemanticConfig,
+    ShareReading,
+)
 from semslam.types import FloatArray, IntArray, KeyframeView, LoopCandidate, LoopEvidence, NodePair
 
 BoolArray = npt.NDArray[np.bool_]
@@ -39,6 +46,7 @@ class SemanticDetector:
 
     name = "semantic"
     needs_labels = True
+    Settings = SemanticConfig
 
     def __init__(self, config: SemanticConfig, loops: LoopConfig) -> None:
         self._config = config
@@ -51,8 +59,8 @@ class SemanticDetector:
 
     @classmethod
     def from_config(cls, config: Config) -> Self:
-        """Take the sections ``semantic`` and ``loops``."""
-        return cls(config.semantic, config.loops)
+        """Take its own section and ``loops``."""
+        return cls(config.section(cls.name, cls.Settings), config.loops)
 
     def query(self, view: KeyframeView) -> list[LoopCandidate]:
         """Candidates with their common labels and matched nodes; score = share of similar nodes.
@@ -121,11 +129,7 @@ class PaperSemanticDetector(SemanticDetector):
     """The same with the thresholds of the paper's section 4.3: 0.8, 0.999, 2.5 % of the larger side, 0.75."""
 
     name = "semantic-paper"
-
-    @classmethod
-    def from_config(cls, config: Config) -> Self:
-        """Take the sections ``semantic_paper`` and ``loops``."""
-        return cls(config.semantic_paper, config.loops)
+    Settings = PaperSemanticConfig
 
 
 class _Shelf:

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from semslam.config import DepthReading, NodeConfig
+from semslam.loop.detectors.semantic.settings import DepthReading, NodeConfig
 from semslam.types import Float32Array, FloatArray, LabelMap, UInt8Array
 
 REFERENCE_SIDE = 640.0

@@ -10,8 +10,6 @@ from torch import Tensor, nn
 from semslam.errors import ModelError
 from semslam.loop.segmentation.network.network import DeepLab, build_mobilenet_deeplab
 
-SHIPPED = Path(__file__).parents[1] / "weights" / "deeplabv3plus_mobilenetv2_nyu40.pt"
-
 
 def read_tensors(path: Path) -> dict[str, Tensor]:
     """Read a state dict as float32.

@@ -4,11 +4,15 @@ import hashlib
 import os
 import zipfile
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 
+from semslam.config import Config
+from semslam.errors import ConfigError
 from semslam.loop.segmentation.photos import UInt8Array
 from semslam.loop.segmentation.segmenter import Segmenter
+from semslam.plugins import load
 from semslam.types import LabelMap
 
 
@@ -19,13 +23,26 @@ class CachedSegmenter:
     steps, and given back so on the first answer too: a run is the same with a warm and a cold cache.
 
     Args:
-        inner: who answers; its ``fingerprint`` must not be empty.
+        inner: who answers; nothing is kept where its ``fingerprint`` is empty.
         folder: where the files go.
     """
 
     def __init__(self, inner: Segmenter, folder: Path) -> None:
         self._inner, self._folder = inner, folder
-        self.fingerprint = inner.fingerprint
+        self.name, self.fingerprint = inner.name, inner.fingerprint
+
+    @classmethod
+    def from_config(cls, config: Config) -> Self:
+        """Put the segmenter ``segmentation.name`` behind the folder ``segmentation.cache_dir``.
+
+        Raises:
+            ConfigError: the folder is not set, the name is unknown or a setting does not fit.
+            ModelError: the network weights cannot be used.
+        """
+        settings = config.segmentation
+        if settings.cache_dir is None:
+            raise ConfigError("A cache of segmentations needs the setting segmentation.cache_dir.")
+        return cls(load("semslam.segmenters", settings.name).from_config(config), settings.cache_dir)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -34,6 +51,8 @@ class CachedSegmenter:
 
     def segment(self, color: UInt8Array, frame_index: int | None = None) -> LabelMap:
         """Look the labels of an image (H, W, 3) up, or ask for them and keep them."""
+        if not self.fingerprint:
+            return self._inner.segment(color, frame_index)
         key = hashlib.sha256(self.fingerprint.encode() + str(color.shape).encode() + color.tobytes()).hexdigest()
         path = self._folder / key[:2] / f"{key}.npz"
         kept = self._read(path)

@@ -13,6 +13,7 @@ from semslam.types import LabelMap
 class ConstantSegmenter:
     """Gives every pixel the class "wall", surely."""
 
+    name = "constant"
     names = NYU40_NAMES
     fingerprint = ""
 

@@ -30,6 +30,7 @@ class FolderSegmenter:
         DatasetError: the folder does not exist or holds no PNG.
     """
 
+    name = "folder"
     fingerprint = ""
 
     def __init__(self, folder: Path) -> None:

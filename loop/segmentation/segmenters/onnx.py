@@ -12,11 +12,8 @@ from semslam.errors import ModelError
 from semslam.loop.segmentation.classes import NYU40_NAMES
 from semslam.loop.segmentation.decoding import decode, input_size, shrink
 from semslam.loop.segmentation.photos import UInt8Array
+from semslam.loop.segmentation.shipped import CHECKPOINT, INT8_GRAPH
 from semslam.types import LabelMap
-
-WEIGHTS = Path(__file__).parents[1] / "weights"
-SHIPPED_INT8 = WEIGHTS / "deeplabv3plus_mobilenetv2_nyu40_int8.onnx"
-SHIPPED = WEIGHTS / "deeplabv3plus_mobilenetv2_nyu40.pt"
 
 
 class OnnxSegmenter:
@@ -28,6 +25,8 @@ class OnnxSegmenter:
         threads: inference threads; they do not spin while they wait, since other stages need the cores.
         min_confidence: below it a pixel becomes void.
     """
+
+    name = "onnx"
 
     def __init__(self, graph: bytes, size: tuple[int, int], threads: int = 1, min_confidence: float = 0.0) -> None:
         self._session = open_session(graph, size, threads)
@@ -65,7 +64,7 @@ def load_graph(weights: Path | None, precision: str) -> bytes:
     Raises:
         ModelError: the file is missing, damaged or of another network.
     """
-    path = weights or (SHIPPED_INT8 if precision == "int8" else SHIPPED)
+    path = weights or (INT8_GRAPH if precision == "int8" else CHECKPOINT)
     if path.suffix != ".onnx":
         from semslam.loop.segmentation.network.checkpoint import load_network
         from semslam.loop.segmentation.network.export import float_graph

@@ -4,13 +4,11 @@ import hashlib
 from pathlib import Path
 from typing import Self
 
-import torch
-
 from semslam.config import Config
 from semslam.loop.segmentation.classes import NYU40_NAMES
 from semslam.loop.segmentation.decoding import decode, input_size, shrink
-from semslam.loop.segmentation.network.checkpoint import SHIPPED, load_network
 from semslam.loop.segmentation.photos import UInt8Array
+from semslam.loop.segmentation.shipped import CHECKPOINT
 from semslam.types import LabelMap
 
 
@@ -27,7 +25,13 @@ class TorchSegmenter:
         ModelError: the weights are missing, damaged or of another network.
     """
 
+    name = "torch"
+
     def __init__(self, weights: Path, size: tuple[int, int], threads: int = 1, min_confidence: float = 0.0) -> None:
+        import torch
+
+        from semslam.loop.segmentation.network.checkpoint import load_network
+
         self._network = load_network(weights)
         self._network.eval()
         torch.set_num_threads(threads)
@@ -39,16 +43,18 @@ class TorchSegmenter:
     def from_config(cls, config: Config) -> Self:
         """Load the shipped checkpoint, or the one that ``segmentation.weights`` names."""
         settings = config.segmentation
-        return cls(settings.weights or SHIPPED, input_size(settings), settings.threads, settings.min_confidence)
+        return cls(settings.weights or CHECKPOINT, input_size(settings), settings.threads, settings.min_confidence)
 
     @property
     def names(self) -> tuple[str, ...]:
         """The 40 NYUv2 classes after void."""
         return NYU40_NAMES
 
-    @torch.inference_mode()
     def segment(self, color: UInt8Array, frame_index: int | None = None) -> LabelMap:
         """Label an RGB image (H, W, 3) uint8."""
-        pixels = torch.from_numpy(shrink(color, self._size)[None])
-        logits, _ = self._network(pixels.permute(0, 3, 1, 2).float() / 127.5 - 1.0)
+        import torch
+
+        with torch.inference_mode():
+            pixels = torch.from_numpy(shrink(color, self._size)[None])
+            logits, _ = self._network(pixels.permute(0, 3, 1, 2).float() / 127.5 - 1.0)
         return decode(logits[0].numpy(), (color.shape[1], color.shape[0]), self._min_confidence)

@@ -7,10 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from semslam.config import Config, FeatureMapConfig
+from semslam.config import Config
 from semslam.features import lift
 from semslam.frontend.feature_map.odometry import FeatureMapOdometry
 from semslam.frontend.feature_map.rolling_shutter import ReadoutEstimate, rectify, velocity_of
+from semslam.frontend.feature_map.settings import FeatureMapConfig
 from semslam.geometry.camera import Intrinsics
 from semslam.geometry.reprojection import measure
 from semslam.geometry.se3 import exp_so3, invert, make_transform, transform_points

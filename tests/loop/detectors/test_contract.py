@@ -19,7 +19,7 @@ from semslam.types import Frame, KeyframeView, LabelMap, LoopCandidate
 NAMES = ("void", "wall", "floor", "chair", "table", "bed")
 CAMERA = Intrinsics(320, 240, 260, 260, 159.5, 119.5)
 CONFIG = Config().with_changes(loops={"min_score": 0.0})
-EXTRACTOR = FeatureExtractor(CONFIG.features)
+EXTRACTOR = FeatureExtractor(CONFIG.keypoints)
 
 
 def view(identity: int, place: int, timestamp: float | None = None) -> KeyframeView:

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from semslam.config import DepthReading, NodeConfig
 from semslam.loop.detectors.semantic.nodes import SemanticNodes, extract_nodes, merge_dense
+from semslam.loop.detectors.semantic.settings import DepthReading, NodeConfig
 from semslam.types import LabelMap
 
 NAMES = ("void", "wall", "chair", "table")

@@ -5,10 +5,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from semslam.config import Config, MatchReading, PaperSemanticConfig, SemanticConfig, ShareReading
+from semslam.config import Config
 from semslam.errors import ConfigError
 from semslam.geometry.camera import Intrinsics
 from semslam.loop.detectors.semantic.detector import PaperSemanticDetector, SemanticDetector, match_nodes, share
+from semslam.loop.detectors.semantic.settings import MatchReading, PaperSemanticConfig, SemanticConfig, ShareReading
 from semslam.types import Cloud, Features, Keyframe, KeyframeView, LabelMap
 
 NAMES = ("void", "wall", "chair", "table", "bed")

@@ -9,6 +9,7 @@ from semslam.types import LabelMap
 
 
 class Counting:
+    name = "counting"
     names = ("void", "thing")
 
     def __init__(self, fingerprint="one", confident=True):
@@ -55,8 +56,15 @@ def test_damaged_file_is_made_anew(tmp_path):
     assert inner.calls == 4
 
 
+def test_what_has_no_fingerprint_is_never_kept(tmp_path):
+    inner = Counting(fingerprint="")
+    cached = CachedSegmenter(inner, tmp_path)
+    cached.segment(IMAGE), cached.segment(IMAGE)
+    assert inner.calls == 2
+    assert not list(tmp_path.iterdir())
+
+
 def test_settings_choose_the_cache(tmp_path):
     settings = {"segmentation": {"cache_dir": str(tmp_path)}}
     assert isinstance(build_segmenter(load_config(overrides=settings)), CachedSegmenter)
-    settings["segmentation"]["name"] = "constant"
-    assert not isinstance(build_segmenter(load_config(overrides=settings)), CachedSegmenter)
+    assert not isinstance(build_segmenter(load_config()), CachedSegmenter)

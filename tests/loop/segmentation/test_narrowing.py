@@ -4,9 +4,10 @@ import pytest
 import torch
 
 from semslam.errors import ModelError
-from semslam.loop.segmentation.network.checkpoint import SHIPPED, load_network
+from semslam.loop.segmentation.network.checkpoint import load_network
 from semslam.loop.segmentation.network.narrowing import narrow_decoder
 from semslam.loop.segmentation.network.network import build_mobilenet_deeplab
+from semslam.loop.segmentation.shipped import CHECKPOINT
 
 
 @pytest.fixture
@@ -35,7 +36,7 @@ def test_channels_that_repeat_others_are_not_missed(images):
 
 
 def test_fewer_channels_say_nearly_the_same(images):
-    network = load_network(SHIPPED).eval()
+    network = load_network(CHECKPOINT).eval()
     with torch.inference_mode():
         before = network(images)[0]
         losses = [((narrow_decoder(network, n, images).eval()(images)[0] - before) ** 2).mean() for n in (128, 64, 8)]

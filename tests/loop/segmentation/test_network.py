@@ -6,7 +6,7 @@ import torch
 import torch.nn.functional as F  # noqa: N812
 
 from semslam.errors import ModelError
-from semslam.loop.segmentation.network.checkpoint import SHIPPED, load_network, save_weights
+from semslam.loop.segmentation.network.checkpoint import load_network, save_weights
 from semslam.loop.segmentation.network.fast_layers import dilated_depthwise, enlarge
 from semslam.loop.segmentation.network.network import (
     ConvNorm,
@@ -16,6 +16,7 @@ from semslam.loop.segmentation.network.network import (
 )
 from semslam.loop.segmentation.network.pretrained import convert_ade20k, refresh_norms
 from semslam.loop.segmentation.network.xception import build_xception_deeplab
+from semslam.loop.segmentation.shipped import CHECKPOINT
 
 
 @pytest.mark.parametrize("build", [build_mobilenet_deeplab, build_xception_deeplab])
@@ -89,8 +90,8 @@ def test_checkpoint_round_trip_is_float16(tmp_path):
 
 
 def test_shipped_checkpoint_is_small_and_fits():
-    assert SHIPPED.stat().st_size < 8_000_000
-    load_network(SHIPPED)
+    assert CHECKPOINT.stat().st_size < 8_000_000
+    load_network(CHECKPOINT)
 
 
 @pytest.mark.parametrize("content", [b"", b"not a checkpoint", b"PK\x03\x04 truncated"])
@@ -103,7 +104,7 @@ def test_damaged_checkpoint_is_one_sentence(tmp_path, content):
 
 def test_truncated_checkpoint_is_one_sentence(tmp_path):
     path = tmp_path / "w.pt"
-    path.write_bytes(SHIPPED.read_bytes()[:100_000])
+    path.write_bytes(CHECKPOINT.read_bytes()[:100_000])
     with pytest.raises(ModelError, match="damaged"):
         load_network(path)
 

@@ -10,10 +10,10 @@ from semslam.loop.detectors.common.backbone import Backbone
 from semslam.loop.segmentation.build import build_segmenter
 from semslam.loop.segmentation.classes import NYU40_NAMES
 from semslam.loop.segmentation.decoding import decode
-from semslam.loop.segmentation.network.checkpoint import SHIPPED
 from semslam.loop.segmentation.overlay import draw_overlay
 from semslam.loop.segmentation.segmenter import Segmenter
 from semslam.loop.segmentation.segmenters.folder import FolderSegmenter
+from semslam.loop.segmentation.shipped import CHECKPOINT
 from semslam.plugins import names
 from semslam.types import LabelMap
 
@@ -118,7 +118,7 @@ def test_bad_weights_are_one_sentence(name, suffix, tmp_path):
 
 
 def test_checkpoint_runs_through_onnx(tmp_path):
-    segmenter = build_segmenter(config_for("onnx", tmp_path, weights=str(SHIPPED)))
+    segmenter = build_segmenter(config_for("onnx", tmp_path, weights=str(CHECKPOINT)))
     assert segmenter.segment(some_image()).labels.shape == (120, 160)
 
 

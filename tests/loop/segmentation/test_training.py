@@ -11,10 +11,11 @@ from semslam.config import load_config
 from semslam.errors import ConfigError, DatasetError, ModelError
 from semslam.loop.segmentation.build import build_segmenter
 from semslam.loop.segmentation.network.averaging import average
-from semslam.loop.segmentation.network.checkpoint import SHIPPED, read_tensors, save_weights
+from semslam.loop.segmentation.network.checkpoint import read_tensors, save_weights
 from semslam.loop.segmentation.network.network import build_mobilenet_deeplab
 from semslam.loop.segmentation.photos import Photo, read_photo
 from semslam.loop.segmentation.segmenters.onnx import load_graph
+from semslam.loop.segmentation.shipped import CHECKPOINT
 from semslam.loop.segmentation.training.augmentation import paste_patch, random_view
 from semslam.loop.segmentation.training.evaluation import confusion_matrix, evaluate, score
 from semslam.loop.segmentation.training.self_training import Teacher, teach
@@ -77,7 +78,7 @@ def test_training_learns_and_its_outputs_serve(rooms, tmp_path):
     losses = []
     out = tmp_path / "run"
     weights = train(
-        rooms, settings(epochs=20, start=str(SHIPPED), freeze_norms=True), out, lambda p: losses.append(p.loss)
+        rooms, settings(epochs=20, start=str(CHECKPOINT), freeze_norms=True), out, lambda p: losses.append(p.loss)
     )
     assert np.mean(losses[-4:]) < 0.7 * np.mean(losses[:4])
     assert [row[0] for row in read_log(out / "training.csv")] == [20, 40]
@@ -116,7 +117,7 @@ def test_teacher_tells_what_it_believes(rooms, tmp_path):
 
 
 def test_training_asks_teachers_once(rooms, tmp_path):
-    taught = settings(epochs=1, unlabelled=str(rooms / "rgb"), teachers=[str(SHIPPED)], unlabelled_share=0.9)
+    taught = settings(epochs=1, unlabelled=str(rooms / "rgb"), teachers=[str(CHECKPOINT)], unlabelled_share=0.9)
     assert train(rooms, taught, tmp_path / "run").exists()
     kept = sorted((tmp_path / "run" / "taught").iterdir())
     assert [path.name for path in kept] == [f"{i}.npy" for i in range(6)]
@@ -226,13 +227,13 @@ def test_the_mean_of_networks_lies_between_them(rooms, tmp_path):
 def test_networks_of_different_widths_have_no_mean(rooms, tmp_path):
     save_weights(build_mobilenet_deeplab(decoder_channels=32), tmp_path / "narrow.pt")
     with pytest.raises(ModelError, match="width"):
-        average(rooms, [SHIPPED, tmp_path / "narrow.pt"], settings(), tmp_path / "mean")
+        average(rooms, [CHECKPOINT, tmp_path / "narrow.pt"], settings(), tmp_path / "mean")
 
 
 def test_wider_networks_are_narrowed_before_the_mean(rooms, tmp_path):
     narrow = settings(decoder_channels=32)
-    one = average(rooms, [SHIPPED], narrow, tmp_path / "one")
-    again = average(rooms, [one, SHIPPED], narrow, tmp_path / "again")
+    one = average(rooms, [CHECKPOINT], narrow, tmp_path / "one")
+    again = average(rooms, [one, CHECKPOINT], narrow, tmp_path / "again")
     first, second = read_tensors(one), read_tensors(again)
     assert first["classifier.weight"].shape == (40, 32, 1, 1)
     assert all(torch.allclose(first[name], second[name], rtol=1e-2, atol=1e-3) for name in first)
@@ -244,7 +245,7 @@ def test_trainings_from_one_start_keep_the_same_channels(rooms, tmp_path):
         read_tensors(
             train(
                 rooms,
-                settings(start=str(SHIPPED), decoder_channels=32, freeze_norms=True, rate=1e-9, seed=s),
+                settings(start=str(CHECKPOINT), decoder_channels=32, freeze_norms=True, rate=1e-9, seed=s),
                 tmp_path / f"{s}",
             )
         )

@@ -10,8 +10,8 @@ from semslam.errors import ConfigError
 from semslam.geometry.camera import Intrinsics
 from semslam.geometry.se3 import exp_so3, invert, make_transform, rotation_angle, transform_points
 from semslam.loop.verification.free_space import free_space_violation
+from semslam.loop.verification.icp import IcpVerifier
 from semslam.loop.verification.registration import ICP_KINDS, measure_fit, refine
-from semslam.loop.verification.verification import IcpVerifier
 from semslam.types import (
     Cloud,
     Features,
@@ -236,7 +236,7 @@ def test_real_neighbours_are_verified_at_the_true_pose_and_strangers_are_not(sha
     from semslam.frontend.keyframes import make_keyframe
 
     config = Config()
-    extractor = FeatureExtractor(config.features)
+    extractor = FeatureExtractor(config.keypoints)
     dataset = open_dataset(shared / "data" / name)
     frames = [dataset.frame(index) for index in (0, 10)]
     other = "redkitchen" if name != "redkitchen" else "rgbd_dataset_freiburg1_rpy_first10s"
@@ -260,7 +260,7 @@ def test_no_wrong_place_is_accepted_among_the_keyframes_of_three_places(shared) 
     from semslam.frontend.keyframes import make_keyframe
 
     config = Config()
-    extractor, details = FeatureExtractor(config.features), FeatureExtractor(config.verification.features)
+    extractor, details = FeatureExtractor(config.keypoints), FeatureExtractor(config.verification.keypoints)
     data = shared / "data"
     places = (data / "redkitchen", data / "rgbd_dataset_freiburg1_rpy_first10s", "synthetic:room?frames=60")
     mixed: list[tuple[int, Keyframe]] = []

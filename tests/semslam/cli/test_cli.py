@@ -7,7 +7,7 @@ import pytest
 
 from tests.conftest import Call
 
-SMALL = ("synthetic:room?frames=12", "--set", "features.count=400")
+SMALL = ("synthetic:room?frames=12", "--set", "keypoints.count=400")
 
 
 def sentences(text: str) -> list[str]:

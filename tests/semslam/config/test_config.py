@@ -7,6 +7,7 @@ import pytest
 from semslam import plugins
 from semslam.config import Config, load_config, load_saved_config, parse_overrides
 from semslam.errors import ConfigError, SemslamWarning
+from semslam.loop.detectors.semantic.settings import SemanticConfig
 
 
 def test_a_dump_reads_back_the_same(tmp_path: Path) -> None:
@@ -23,9 +24,10 @@ def test_overrides_reach_nested_sections_and_leave_the_rest() -> None:
 
 
 def test_a_setting_leaves_those_beside_it_as_they_are() -> None:
-    config = load_config(None, parse_overrides(["verification.features.levels=6", "semantic.nodes.cluster_size=4"]))
-    assert config.verification.features == Config().verification.features.model_copy(update={"levels": 6})
-    assert config.semantic.nodes == Config().semantic.nodes.model_copy(update={"cluster_size": 4})
+    config = load_config(None, parse_overrides(["verification.keypoints.levels=6", "semantic.nodes.cluster_size=4"]))
+    assert config.verification.keypoints == Config().verification.keypoints.model_copy(update={"levels": 6})
+    nodes = config.section("semantic", SemanticConfig).nodes
+    assert nodes == SemanticConfig().nodes.model_copy(update={"cluster_size": 4})
 
 
 def test_saved_settings_that_are_gone_are_left_out_with_a_warning(tmp_path: Path) -> None:

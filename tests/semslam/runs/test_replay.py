@@ -90,11 +90,11 @@ def test_an_interrupted_or_older_run_is_replayed_with_a_remark(semslam: Call, sa
         np.savez(older / "frontend.npz", **dict(file) | {"interrupted": np.array(True)})
     settings_file = older / "config.yaml"
     settings_file.write_text(settings_file.read_text() + "forgotten: 1\n")
-    outcome = semslam("run", "--from", older, "--set", "seed=3", "--out", tmp_path / "again", "--no-plots")
+    outcome = semslam("run", "--from", older, "--set", "backend.robust=dcs", "--out", tmp_path / "again", "--no-plots")
     assert outcome.code == 0
     assert "was interrupted; its 8 frames of 8 were used" in outcome.err
     assert "left out, being no settings now: forgotten." in outcome.err
-    assert "seed: 3" in (tmp_path / "again" / "config.yaml").read_text()
+    assert "robust: dcs" in (tmp_path / "again" / "config.yaml").read_text()
 
 
 def test_another_sequence_is_refused(wall: WallDataset) -> None:
@@ -104,12 +104,32 @@ def test_another_sequence_is_refused(wall: WallDataset) -> None:
             replay(other, recording, ALONE)
 
 
-@pytest.mark.parametrize("changes", [{"odometry": "dense"}, {"dataset": {"stride": 2}}, {"keyframes": {"interval": 1}}])
-def test_settings_of_the_front_end_cannot_change(wall: WallDataset, changes: dict[str, object]) -> None:
+@pytest.mark.parametrize(
+    ("decisive", "changes"),
+    [
+        ("odometry", {"odometry": "dense"}),
+        ("dataset", {"dataset": {"stride": 2}}),
+        ("keyframes.interval", {"keyframes": {"interval": 1}}),
+        ("feature_map", {"feature_map": {"readout": 0.0}}),
+        ("keypoints", {"keypoints": {"count": 500}}),
+        ("seed", {"seed": 3}),
+        ("plugins.feature_map", {"plugins": {"feature_map": {"anything": 1}}}),
+    ],
+)
+def test_settings_that_the_odometry_reads_cannot_change(
+    wall: WallDataset, decisive: str, changes: dict[str, object]
+) -> None:
     saved = SavedFrontEnd(ALONE, run(wall, ALONE).recording, None)
-    saved.check_settings(ALONE.with_changes(detector="fused", seed=3, keyframes={"cloud_voxel": 0.1}))
-    with pytest.raises(ConfigError, match=f"'{next(iter(changes))}' decides the front end"):
+    with pytest.raises(ConfigError, match=f"'{decisive}' decides the odometry"):
         saved.check_settings(ALONE.with_changes(**changes))
+
+
+def test_settings_that_the_odometry_does_not_read_may_change(wall: WallDataset) -> None:
+    saved = SavedFrontEnd(ALONE, run(wall, ALONE).recording, None)
+    others = {"dense": {"max_depth": 3.0}, "plugins": {"mine": {"bins": 4}}, "keyframes": {"cloud_voxel": 0.1}}
+    saved.check_settings(ALONE.with_changes(detector="fused", **others))
+    kiss = ALONE.with_changes(odometry="kiss")
+    SavedFrontEnd(kiss, saved.recording, None).check_settings(kiss.with_changes(seed=3, keypoints={"count": 500}))
 
 
 def test_what_cannot_be_replayed_is_one_sentence(semslam: Call, saved: Path, tmp_path: Path) -> None:
@@ -125,7 +145,7 @@ def test_what_cannot_be_replayed_is_one_sentence(semslam: Call, saved: Path, tmp
         (("--from", tmp_path), "has no frontend.npz"),
         (("--from", damaged), "is damaged"),
         (("--from", nameless), "does not tell where its images are"),
-        (("--from", saved, "--odometry", "dense"), "'odometry' decides the front end"),
+        (("--from", saved, "--odometry", "dense"), "'odometry' decides the odometry"),
         (("--from", saved, "--config", other), "change them with --set"),
         (("--from", saved, "synthetic:house?frames=30&width=160"), "not the sequence"),
         ((), "Name a sequence"),

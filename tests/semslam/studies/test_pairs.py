@@ -66,7 +66,7 @@ def test_pairs_json_keeps_its_contract(semslam: Call, tmp_path: Path) -> None:
         (("synthetic:castle",), "castle"),
         (("--folder", "/nowhere"), "pairs.csv cannot be read"),
         (("synthetic:room", "--detectors", "none"), "proposes nothing"),
-        (("synthetic:room", "--detectors", "eyes"), "no detector 'eyes'"),
+        (("synthetic:room", "--detectors", "eyes"), "no loop detector 'eyes'"),
         (("synthetic:room", "--set", "segmentation.name=folder"), "has no labels for frames"),
     ],
 )

@@ -10,7 +10,7 @@ from semslam.eval.trajectory import poses_at
 from semslam.features import FeatureExtractor
 from semslam.frontend.keyframes import make_keyframe
 from semslam.geometry.se3 import FloatArray, invert, make_transform, rotation_angle
-from semslam.loop.verification.verification import IcpVerifier
+from semslam.loop.verification.icp import IcpVerifier
 from semslam.types import Keyframe, LoopCandidate, LoopConstraint
 
 STEP_SIGMAS = np.array([0.004] * 3 + [0.02] * 3)
@@ -30,7 +30,7 @@ def test_loops_between_twin_rooms_pass_verification_and_not_the_graph() -> None:
     assert dataset.ground_truth is not None
     poses, _ = poses_at(dataset.ground_truth, [dataset.timestamps[i] for i in indices])
     again = next(k for k in range(60, len(indices)) if np.linalg.norm(poses[k, :3, 3] - poses[0, :3, 3]) < 0.3)
-    extractor, details = FeatureExtractor(config.features), FeatureExtractor(config.verification.features)
+    extractor, details = FeatureExtractor(config.keypoints), FeatureExtractor(config.verification.keypoints)
     made: dict[int, Keyframe] = {}
 
     def keyframe(k: int) -> Keyframe:
