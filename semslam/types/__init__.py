@@ -1,0 +1,47 @@
+"""What flows between the stages. All of it is frozen.
+
+Transforms name both frames, target first. Metres, radians, seconds. Covariances (6, 6) are in GTSAM's Pose3
+tangent order, rotation first, and belong to the frame on the right of the transform's name.
+"""
+
+from semslam.geometry.camera import Intrinsics
+from semslam.types.arrays import Float32Array, FloatArray, IntArray, UInt8Array
+from semslam.types.features import Cloud, Features
+from semslam.types.images import Frame, LabelMap
+from semslam.types.keyframes import Keyframe, KeyframeView
+from semslam.types.loops import (
+    LoopCandidate,
+    LoopConstraint,
+    LoopEvidence,
+    LoopOutcome,
+    LoopRejection,
+    NodePair,
+    RejectionReason,
+)
+from semslam.types.tracking import Motion, Observations, TrackingStatus
+from semslam.types.trajectory import Trajectory
+
+__all__ = [
+    "Cloud",
+    "Features",
+    "Float32Array",
+    "FloatArray",
+    "Frame",
+    "IntArray",
+    "Intrinsics",
+    "Keyframe",
+    "KeyframeView",
+    "LabelMap",
+    "LoopCandidate",
+    "LoopConstraint",
+    "LoopEvidence",
+    "LoopOutcome",
+    "LoopRejection",
+    "Motion",
+    "NodePair",
+    "Observations",
+    "RejectionReason",
+    "TrackingStatus",
+    "Trajectory",
+    "UInt8Array",
+]

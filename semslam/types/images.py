@@ -1,0 +1,40 @@
+"""One image of a sequence, and what is labelled in it."""
+
+from dataclasses import dataclass
+
+from semslam.geometry.camera import Intrinsics
+from semslam.types.arrays import Float32Array, UInt8Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Frame:
+    """One RGB-D image of a sequence.
+
+    Attributes:
+        index: position in the sequence, from 0.
+        timestamp: seconds.
+        color: (H, W, 3) uint8 RGB, raw (distorted) pixels.
+        depth: (H, W) float32 metres along the optical axis, registered to colour; 0 = none.
+        intrinsics: the camera.
+    """
+
+    index: int
+    timestamp: float
+    color: UInt8Array
+    depth: Float32Array
+    intrinsics: Intrinsics
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LabelMap:
+    """A segmented image.
+
+    Attributes:
+        labels: (H, W) uint8, indices into ``names``; 0 is void.
+        names: class names; ``names[0]`` is "void".
+        confidence: (H, W) float32 in 0..1, or None where the segmenter has none.
+    """
+
+    labels: UInt8Array
+    names: tuple[str, ...]
+    confidence: Float32Array | None = None

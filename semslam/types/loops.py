@@ -1,0 +1,121 @@
+"""A loop from its proposal to its verification."""
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+from semslam.types.arrays import FloatArray, IntArray
+
+
+@dataclass(frozen=True, slots=True)
+class NodePair:
+    """Two semantic nodes that were matched.
+
+    Attributes:
+        label: class name.
+        query_uvd: u, v in pixels and depth in metres in the query.
+        match_uvd: the same in the match.
+    """
+
+    label: str
+    query_uvd: tuple[float, float, float]
+    match_uvd: tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class LoopEvidence:
+    """What made a detector propose a pair.
+
+    Attributes:
+        labels: class names both frames share.
+        nodes: matched semantic nodes.
+        figures: named scores that went into the decision.
+    """
+
+    labels: tuple[str, ...] = ()
+    nodes: tuple[NodePair, ...] = ()
+    figures: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class LoopCandidate:
+    """A pair of keyframes that a detector takes for the same place.
+
+    Attributes:
+        query: id of the newer keyframe.
+        match: id of the older one.
+        score: 0..1, higher is surer.
+        detector: registered name of who proposed it.
+        evidence: what agreed.
+    """
+
+    query: int
+    match: int
+    score: float
+    detector: str
+    evidence: LoopEvidence = LoopEvidence()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LoopConstraint:
+    """A verified loop closure.
+
+    Attributes:
+        candidate: what was verified.
+        T_match_query: (4, 4) pose of the query camera in the match camera.
+        covariance: (6, 6) of T_match_query.
+        fitness: share of the query's points that meet the match's surface, 0..1.
+        inlier_rmse: metres, of those points.
+        overlap: the smaller share of either view that the other one sees, 0..1.
+        inliers: feature matches that support the pose.
+        method: which estimate was kept, such as "pnp" or "icp".
+        figures: what the steps on the way measured, by name.
+        shared: (K, 2) int64 rows of the query's and of the match's ``finest`` features that agree, or None.
+    """
+
+    candidate: LoopCandidate
+    T_match_query: FloatArray
+    covariance: FloatArray
+    fitness: float
+    inlier_rmse: float
+    overlap: float
+    inliers: int
+    method: str
+    figures: dict[str, float] = field(default_factory=dict)
+    shared: IntArray | None = None
+
+
+class RejectionReason(StrEnum):
+    """Why a candidate did not become a constraint, or a constraint did not stay."""
+
+    FEW_MATCHES = "few_matches"
+    FEW_INLIERS = "few_inliers"
+    NO_CLOUD = "no_cloud"
+    LOW_FITNESS = "low_fitness"
+    HIGH_RMSE = "high_rmse"
+    LOW_OVERLAP = "low_overlap"
+    FREE_SPACE = "free_space"
+    DEGENERATE = "degenerate"
+    INCONSISTENT = "inconsistent"
+    AMBIGUOUS = "ambiguous"
+    OUTLIER = "outlier"
+
+
+@dataclass(frozen=True, slots=True)
+class LoopRejection:
+    """A candidate that was refused.
+
+    Attributes:
+        candidate: what was refused.
+        reason: the test it failed.
+        figure: the value that failed.
+        limit: the value it should have met.
+    """
+
+    candidate: LoopCandidate
+    reason: RejectionReason
+    figure: float
+    limit: float
+
+
+LoopOutcome = LoopConstraint | LoopRejection
+"""What the verification makes of a candidate."""
