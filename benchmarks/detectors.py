@@ -30,8 +30,7 @@ from semslam.eval.loops.reliability import calibration_error
 from semslam.eval.loops.truth import TRUE_OVERLAP, find_loop_truth, make_view
 from semslam.eval.pairs.changes import Change, change_frame
 from semslam.eval.trajectory import BoolArray, poses_at
-from semslam.features import FeatureExtractor
-from semslam.frontend.keyframes import make_keyframe
+from semslam.frontend.keyframes import KeyframeBuilder
 from semslam.geometry.se3 import invert, rotation_angle
 from semslam.loop.detector import LoopDetector
 from semslam.loop.segmentation.build import build_segmenter
@@ -139,15 +138,14 @@ def wrong_and_near(dataset: Dataset, views: list[KeyframeView], min_gap: float) 
 
 def changed_views(views: list[KeyframeView], config: Config) -> Iterator[tuple[int, Change, KeyframeView]]:
     """Every third view, unchanged and with each change that it can show, asked for long after the last one."""
-    segmenter, extractor = build_segmenter(config), FeatureExtractor(config.keypoints)
+    segmenter, builder = build_segmenter(config), KeyframeBuilder(config, details=False)
     for row in range(0, len(views), CHANGED_STEP):
         old = views[row]
         frame = Frame(row, old.keyframe.timestamp + LATER, old.color, old.depth, old.keyframe.intrinsics)
         for change in Change:
             changed = change_frame(frame, change, row)
             if change is Change.NONE or changed is not frame:
-                features, pose = extractor.extract(changed), old.keyframe.T_odom_cam
-                keyframe = make_keyframe(len(views), changed, pose, 0, features, config.keyframes)
+                keyframe = replace(builder.build_at(changed, old.keyframe.T_odom_cam), id=len(views))
                 labels = segmenter.segment(changed.color)
                 yield row, change, KeyframeView(keyframe, changed.color, changed.depth, labels)
 

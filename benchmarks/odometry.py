@@ -27,8 +27,8 @@ from semslam.config import Config, DatasetConfig, FaultConfig
 from semslam.datasets import Dataset, open_dataset
 from semslam.datasets.tum_format import read_trajectory
 from semslam.eval.trajectory import score_trajectory
+from semslam.frontend.keyframes import KeyframeBuilder
 from semslam.frontend.odometry import Odometry
-from semslam.loop.verification.icp import IcpVerifier
 from semslam.runs.pipeline import run
 from semslam.runtime.stopwatch import Stopwatch
 from semslam.system.slam import Slam
@@ -78,10 +78,8 @@ def track(name: str, path: Path, start: int, optimize: bool) -> Row:
     dataset = open_dataset(path, DatasetConfig(start=start))
     config = Config().with_changes(odometry=name, detector="none")
     odometry = TimedOdometry(plugins.load("semslam.odometry", name).from_config(config))
-    detector = plugins.load("semslam.detectors", "none").from_config(config)
-    slam = Slam(
-        odometry, None, detector, IcpVerifier.from_config(config), PoseGraph(config.backend), config, Stopwatch()
-    )
+    builder = KeyframeBuilder(config, details=False)
+    slam = Slam(odometry, builder, None, PoseGraph(config.backend), config, Stopwatch())
     states = [slam.process(frame) for frame in dataset]
     timestamps = np.array(dataset.timestamps)
     return Row(

@@ -60,7 +60,7 @@ def find_features(extractor: FeatureExtractor, photo: UInt8Array) -> Features:
 
 
 def vocabulary_from(folder: Path) -> None:
-    extractor = FeatureExtractor(Config().features)
+    extractor = FeatureExtractor(Config().keypoints)
     photos = [find_features(extractor, p).descriptors for p in read_photos(folder / "rgb", folder / "unlabelled")]
     vocabulary.train_vocabulary(photos, branching=8, depth=5, seed=SEED).save(vocabulary.SHIPPED)
 

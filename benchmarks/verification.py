@@ -23,8 +23,7 @@ from semslam.config import Config
 from semslam.datasets import open_dataset
 from semslam.eval.loops.truth import ANGLE_TOLERANCE, POSE_TOLERANCE, LoopTruth, find_loop_truth, make_view
 from semslam.eval.trajectory import poses_at
-from semslam.features import FeatureExtractor
-from semslam.frontend.keyframes import make_keyframe
+from semslam.frontend.keyframes import KeyframeBuilder
 from semslam.geometry.se3 import FloatArray, invert, rotation_angle, tangent
 from semslam.loop.detector import LoopDetector
 from semslam.loop.segmentation.build import build_segmenter
@@ -54,14 +53,12 @@ def keyframes(path: str, every: int, config: Config, first: int, start: float) -
     dataset, segmenter = open_dataset(path), build_segmenter(config)
     assert dataset.ground_truth is not None, f"{path} has no ground truth."
     poses, _ = poses_at(dataset.ground_truth, dataset.timestamps[::every])
-    extractor, details = FeatureExtractor(config.keypoints), FeatureExtractor(config.verification.keypoints)
+    builder = KeyframeBuilder(config)
     for number, index in enumerate(range(0, len(dataset), every)):
         frame = dataset.frame(index)
-        found = extractor.extract(frame), details.extract(frame)
-        T_odom_cam = invert(poses[0]) @ poses[number]  # detectors turn images upright by it
-        keyframe = make_keyframe(first + number, frame, T_odom_cam, 0, found[0], config.keyframes, found[1])
+        keyframe = builder.build_at(frame, invert(poses[0]) @ poses[number])  # detectors turn images upright by it
         labels = segmenter.segment(frame.color, frame.index)
-        later = replace(keyframe, timestamp=keyframe.timestamp + start)
+        later = replace(keyframe, id=first + number, timestamp=keyframe.timestamp + start)
         yield KeyframeView(later, frame.color, frame.depth, labels)
 
 

@@ -1,12 +1,13 @@
 """Following a loop: once a place is known again, the keyframes that come after it are at known places too."""
 
-from collections.abc import Iterator, Sequence
+from collections import deque
+from collections.abc import Sequence
 
 import numpy as np
 
 from semslam.config import LoopConfig
 from semslam.geometry.se3 import invert, transform_points
-from semslam.types import FloatArray, Keyframe, LoopCandidate, LoopConstraint, LoopEvidence, LoopRejection
+from semslam.types import FloatArray, Keyframe, LoopCandidate, LoopConstraint, LoopEvidence, LoopOutcome
 
 GAP_SHARE = 0.5
 """Share of ``loops.min_gap`` that must lie between followed frames: what the loops before say bears them out."""
@@ -33,54 +34,71 @@ class LoopFollower:
     def __init__(self, config: LoopConfig) -> None:
         self._config = config
         self._poses: list[FloatArray] = []
+        self._frames: list[int] = []  # which keyframe's map each pose is in: poses of different maps do not compare
         self._tried: set[int] = set()
+        self._waiting: deque[LoopCandidate] | None = None
         self._verified = 0
         self._following = False
 
     def add(self, keyframe: Keyframe, before: Keyframe | None) -> None:
-        """Take the newest keyframe, whose loops will be noted next; it follows the one before by odometry."""
+        """Take the newest keyframe, whose loops will be noted next, and the one before it."""
         if before is None or before.map_id != keyframe.map_id:
             self._following = False
             self._poses.append(keyframe.T_odom_cam)
+            self._frames.append(keyframe.id)
         else:
             self._poses.append(self._poses[-1] @ invert(before.T_odom_cam) @ keyframe.T_odom_cam)
-        self._tried, self._verified = set(), 0
+            self._frames.append(self._frames[-1])
+        self._tried, self._verified, self._waiting = set(), 0, None
 
-    def note(self, outcome: LoopConstraint | LoopRejection) -> None:
+    def note(self, outcome: LoopOutcome) -> None:
         """Take into account what became of a candidate of the newest keyframe, whoever proposed it."""
         match = outcome.candidate.match
         self._tried.add(match)
         if isinstance(outcome, LoopConstraint):
             if not self._verified:
                 self._poses[-1] = self._poses[match] @ outcome.T_match_query
+                self._frames[-1] = self._frames[match]
             self._verified += 1
             self._following = True
 
-    def candidates(self, keyframes: Sequence[Keyframe]) -> Iterator[LoopCandidate]:
-        """Earlier keyframes to verify with the newest, ``loops.follow`` at the most, those that see most of it first.
+    def propose(self, keyframes: Sequence[Keyframe]) -> LoopCandidate | None:
+        """The next earlier keyframe to verify with the newest one, or None where no more should be.
 
-        What became of each must be noted before the next one is taken.
+        Those that hold most of what it sees come first, ``loops.follow`` of them at the most. The outcomes of the
+        detector's candidates and of each proposal are to be noted before the next is asked for.
 
         Args:
             keyframes: all so far; ``keyframes[i].id`` is i.
         """
-        if not self._following or not self._config.follow:
-            return
+        if not self._following or self._verified >= ENOUGH:
+            return None
+        if self._waiting is None:
+            self._waiting = self._best_views(keyframes)
+        return self._waiting.popleft() if self._waiting else None
+
+    def _best_views(self, keyframes: Sequence[Keyframe]) -> deque[LoopCandidate]:
+        if not self._config.follow:
+            return deque()
         query = keyframes[-1]
         seen = self._seen(query, keyframes)
         order = [match for match in np.argsort(-seen, kind="stable").tolist() if seen[match] >= MIN_SEEN]
-        for match in [match for match in order if match not in self._tried][: self._config.follow]:
-            if self._verified >= ENOUGH:
-                return
-            share = float(seen[match])
-            yield LoopCandidate(query.id, match, share, self.name, LoopEvidence(figures={"predicted_overlap": share}))
+        untried = [match for match in order if match not in self._tried][: self._config.follow]
+        return deque(self._candidate(query.id, match, float(seen[match])) for match in untried)
+
+    def _candidate(self, query: int, match: int, share: float) -> LoopCandidate:
+        return LoopCandidate(query, match, share, self.name, LoopEvidence(figures={"predicted_overlap": share}))
 
     def _seen(self, query: Keyframe, keyframes: Sequence[Keyframe]) -> FloatArray:
-        """Share (N,) of the query's points that each earlier view holds; 0 for those too young to close a loop."""
+        """Share (N,) of the query's points that each earlier view holds; 0 for too young ones and those of another map."""
         cloud = query.cloud.points
         points = transform_points(self._poses[-1], cloud[:: max(len(cloud) // POINTS, 1)].astype(np.float64))
         gap = GAP_SHARE * self._config.min_gap
-        old = [k for k in keyframes[:-1] if query.timestamp - k.timestamp >= gap]
+        old = [
+            k
+            for k in keyframes[:-1]
+            if query.timestamp - k.timestamp >= gap and self._frames[k.id] == self._frames[query.id]
+        ]
         shares = np.zeros(len(keyframes))
         if not old or not len(points):
             return shares

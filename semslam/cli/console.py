@@ -12,7 +12,7 @@ from rich.text import Text
 
 if TYPE_CHECKING:
     from semslam.runs.metrics import LoopMetrics, Metrics
-    from semslam.system.slam import FrameState
+    from semslam.system.result import FrameState
 
 PIPED_WIDTH = 120
 # A file or a pipe has no width of its own; 80 columns would fold the wider tables.

@@ -16,7 +16,8 @@ from semslam.runs.metrics import Metrics, TimeMetrics
 from semslam.runs.recording import RecordedFrame, Recording, checksum
 from semslam.runs.scoring import score_run
 from semslam.runtime.stopwatch import Stopwatch
-from semslam.system.slam import FrameState, Slam, SlamResult
+from semslam.system.result import FrameState, SlamResult
+from semslam.system.slam import Slam
 from semslam.types import Trajectory
 
 Progress = Callable[[int, FrameState | None], None]
@@ -99,7 +100,7 @@ def replay(
     """
     recording.check(dataset)
     session = _Session(dataset, config, verifier)
-    session.drive(session.follow(recording), progress)
+    session.drive(session.repeat(recording), progress)
     return session.result()
 
 
@@ -124,13 +125,13 @@ class _Session:
                 self._checksum = self._checksum or checksum(item)
                 yield index, self._slam.process(item)
 
-    def follow(self, recording: Recording) -> Iterator[tuple[int, FrameState]]:
-        """Go along recorded motions."""
+    def repeat(self, recording: Recording) -> Iterator[tuple[int, FrameState]]:
+        """Take each frame's motion from a recording."""
         self._unreadable.extend(recording.unreadable)
         self._checksum, self._interrupted = recording.checksum, recording.interrupted
         for frame in recording.frames:
             read = partial(self._dataset.frame, frame.index)
-            yield frame.index, self._slam.follow(frame.index, frame.timestamp, frame.motion, read)
+            yield frame.index, self._slam.advance(frame.index, frame.timestamp, frame.motion, read)
 
     def drive(self, states: Iterable[tuple[int, FrameState | None]], progress: Progress) -> None:
         """Take frame after frame until the last, or until Ctrl-C."""

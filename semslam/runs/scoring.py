@@ -15,7 +15,7 @@ from semslam.eval.trajectory import TrajectoryScore, coverage, score_trajectory
 from semslam.runs.contributions import loop_contributions
 from semslam.runs.ledger import GraphVerdict, LedgerEntry, LoopContribution, Verdict, rejected_entry, verified_entry
 from semslam.runs.metrics import LoopMetrics, Metrics, TimeMetrics, TrajectoryMetrics
-from semslam.system.slam import FrameState, SlamResult
+from semslam.system.result import FrameState, SlamResult
 from semslam.types import LoopConstraint, RejectionReason, TrackingStatus, Trajectory
 
 

@@ -3,8 +3,6 @@
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from semslam import plugins
 from semslam.config import Config
 from semslam.datasets.dataset import Dataset
@@ -20,8 +18,7 @@ from semslam.eval.loops.precision_recall import (
 )
 from semslam.eval.loops.reliability import ScoreBin, reliability_of
 from semslam.eval.loops.truth import DepthView, find_loop_truth, make_view
-from semslam.features import FeatureExtractor
-from semslam.frontend.keyframes import make_keyframe
+from semslam.frontend.keyframes import EveryNth, KeyframeBuilder
 from semslam.loop.detector import LoopDetector
 from semslam.loop.segmentation.build import build_segmenter
 from semslam.types import KeyframeView
@@ -89,30 +86,24 @@ def compare_detectors(
 def keyframe_views(
     dataset: Dataset, config: Config, every: int, needs_labels: bool, report: Report = lambda _done, _total: None
 ) -> Iterator[KeyframeView]:
-    """Every ``every``-th frame as a keyframe with its images, tracked by the configured odometry.
+    """Every ``every``-th frame as a keyframe with its images, tracked by the configured odometry; lost ones are skipped.
 
     Raises:
         DatasetError: a keyframe's image cannot be read.
     """
     odometry = plugins.load("semslam.odometry", config.odometry).from_config(config)
     segmenter = build_segmenter(config) if needs_labels else None
-    extractor, details = FeatureExtractor(config.keypoints), FeatureExtractor(config.verification.keypoints)
-    T_odom_cam = np.eye(4)
-    count = 0
+    builder = KeyframeBuilder(config, EveryNth(every))
     for index, frame in enumerate(prefetch(dataset)):
         report(index + 1, len(dataset))
         if isinstance(frame, DatasetError):
             if index % every == 0:
                 raise frame
             continue
-        T_odom_cam = T_odom_cam @ odometry.track(frame).T_prev_cur
-        if index % every:
-            continue
-        features, more = extractor.extract(frame), details.extract(frame)
-        keyframe = make_keyframe(count, frame, T_odom_cam, 0, features, config.keyframes, more)
-        labels = None if segmenter is None else segmenter.segment(frame.color, frame.index)
-        count += 1
-        yield KeyframeView(keyframe, frame.color, frame.depth, labels)
+        if builder.advance(index, frame.timestamp, odometry.track(frame)):
+            keyframe = builder.build(frame)
+            labels = None if segmenter is None else segmenter.segment(frame.color, frame.index)
+            yield KeyframeView(keyframe, frame.color, frame.depth, labels)
 
 
 def check_scorable(names: Sequence[str]) -> None:
@@ -135,8 +126,7 @@ def exhaustive_detector(name: str, config: Config, keyframes: int) -> LoopDetect
     """
     check_scorable([name])
     everything = config.loops.model_copy(update={"max_candidates": max(keyframes, 1), "min_score": 0.0})
-    detector: LoopDetector = plugins.load("semslam.detectors", name).from_config(config.with_changes(loops=everything))
-    return detector
+    return plugins.load("semslam.detectors", name).from_config(config.with_changes(loops=everything))
 
 
 def _contestant(name: str, config: Config, keyframes: int) -> Contestant:

@@ -23,8 +23,7 @@ from semslam.eval.pairs.judging import (
 )
 from semslam.eval.pairs.reader import read_pair_folder
 from semslam.eval.trajectory import poses_at
-from semslam.features import FeatureExtractor
-from semslam.frontend.keyframes import make_keyframe
+from semslam.frontend.keyframes import KeyframeBuilder
 from semslam.geometry.se3 import FloatArray, invert
 from semslam.loop.detectors.fused.detector import FusedConfig
 from semslam.loop.segmentation.build import build_segmenter
@@ -164,12 +163,11 @@ def _scores(
 ) -> dict[str, FloatArray]:
     detectors = {name: exhaustive_detector(name, config, len(pairs)) for name in names}
     segmenter = build_segmenter(config) if any(d.needs_labels for d in detectors.values()) else None
-    extractor = FeatureExtractor(config.keypoints)
+    builder = KeyframeBuilder(config, details=False)
 
     def make(identity: int, frame: Frame, T_world_cam: FloatArray) -> KeyframeView:
         report(title, identity, 2 * len(pairs))
-        features = extractor.extract(frame)
-        keyframe = make_keyframe(identity, frame, T_world_cam, 0, features, config.keyframes)
+        keyframe = builder.build_at(frame, T_world_cam)
         labels = None if segmenter is None else segmenter.segment(frame.color, frame.index)
         return KeyframeView(keyframe, frame.color, frame.depth, labels)
 

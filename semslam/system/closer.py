@@ -7,7 +7,6 @@ import gtsam
 import numpy as np
 import numpy.typing as npt
 
-from semslam import plugins
 from semslam.backend.graph.chain import OdometryChain
 from semslam.backend.graph.checks import checked_pose
 from semslam.backend.graph.factors import between_factor, read_edges
@@ -15,16 +14,17 @@ from semslam.backend.graph.products import Edge, loop_edge
 from semslam.backend.pose_graph import PoseGraph
 from semslam.config import Config
 from semslam.errors import DatasetError, GraphError
-from semslam.features import FeatureExtractor
-from semslam.frontend.keyframes import make_keyframe
+from semslam.frontend.keyframes import KeyframeBuilder
 from semslam.geometry.se3 import FloatArray, adjoint, invert
 from semslam.loop.detector import LoopDetector
-from semslam.loop.segmentation.build import build_segmenter
-from semslam.loop.segmentation.segmenter import Segmenter
-from semslam.loop.verification.verifier import LoopVerifier, build_verifier
-from semslam.types import Frame, Intrinsics, Keyframe, KeyframeView, LabelMap, LoopConstraint
+from semslam.loop.search import LoopSearch
+from semslam.loop.verification.verifier import LoopVerifier
+from semslam.types import Frame, Intrinsics, LabelMap, LoopConstraint
 
 Noise = Callable[[LoopConstraint], gtsam.noiseModel.Base]
+
+POSED = -1
+"""Map of all keyframes that come with a pose; one without a pose is a map of its own, numbered by the keyframe."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -47,9 +47,12 @@ class Closure:
 class LoopCloser:
     """Finds and verifies loop closures and returns them as ``gtsam.BetweenFactorPose3``.
 
-    Everything happens in the caller's thread, within ``add``. The closer never touches the caller's graph: what
-    enters it, and what is taken out again, is the caller's to decide. Two rooms that look and measure alike pass every
-    test on two views: only odometry tells them apart, so ask ``believed`` before a loop is followed for good.
+    Everything happens in the caller's thread, within ``add``. Where keyframes come with poses, a loop is followed:
+    after it, earlier keyframes whose views should overlap by those poses are verified as well.
+
+    The closer never touches the caller's graph: what enters it, and what is taken out again, is the caller's to
+    decide. Two rooms that look and measure alike pass every test on two views: only odometry distinguishes them, so
+    ask ``believed`` before a loop is trusted for good.
 
     Args:
         intrinsics: the camera of all images.
@@ -78,26 +81,17 @@ class LoopCloser:
         verifier: LoopVerifier | None = None,
     ) -> None:
         self._config = config or Config()
+        if isinstance(detector, str):
+            self._config = self._config.with_changes(detector=detector)
         self._intrinsics = intrinsics
         self._T_body_cam = checked_pose(np.eye(4) if T_body_cam is None else T_body_cam, "The camera on the body")
         self._noise = noise
         self._kernel = kernel
-        self._detector = self._chosen(detector or self._config.detector)
-        self._segmenter: Segmenter | None = None
-        if self._detector.needs_labels:
-            self._segmenter = build_segmenter(self._config)
-        self._verifier = verifier or build_verifier(self._config)
-        self._extractor = FeatureExtractor(self._config.keypoints)
-        self._details = FeatureExtractor(self._config.verification.keypoints)
+        own = None if isinstance(detector, str) else detector
+        self._search = LoopSearch.from_config(self._config, detector=own, verifier=verifier)
+        self._builder = KeyframeBuilder(self._config)
         self._keys: list[int] = []
-        self._keyframes: list[Keyframe] = []
         self._closures: list[Closure] = []
-
-    def _chosen(self, detector: str | LoopDetector) -> LoopDetector:
-        if not isinstance(detector, str):
-            return detector
-        chosen: LoopDetector = plugins.load("semslam.detectors", detector).from_config(self._config)
-        return chosen
 
     @property
     def closures(self) -> tuple[Closure, ...]:
@@ -130,25 +124,24 @@ class LoopCloser:
             DatasetError: the images do not fit the camera or are of the wrong type.
         """
         if timestamp is None:
-            before = self._keyframes[-1].timestamp if self._keyframes else 0.0
-            timestamp = before + self._config.keyframes.interval
+            before = self._last_timestamp
+            timestamp = (0.0 if before is None else before) + self._config.keyframes.interval
         self._check(key, timestamp)
-        pose = np.eye(4) if T_world_cam is None else checked_pose(T_world_cam, f"The pose of key {key}")
         frame = self._frame(color, depth, timestamp)
-        features = self._extractor.extract(frame)
-        details = self._details.extract(frame)
-        keyframe = make_keyframe(frame.index, frame, pose, 0, features, self._config.keyframes, details)
-        if labels is None and self._segmenter is not None:
-            labels = self._segmenter.segment(frame.color)
-        view = KeyframeView(keyframe, frame.color, frame.depth, labels)
-        candidates = self._detector.query(view)
-        self._detector.add(view)
+        if T_world_cam is None:
+            keyframe = self._builder.build_at(frame, np.eye(4), map_id=frame.index)
+        else:
+            keyframe = self._builder.build_at(frame, checked_pose(T_world_cam, f"The pose of key {key}"), POSED)
         self._keys.append(key)
-        self._keyframes.append(keyframe)
-        outcomes = [self._verifier.verify(keyframe, self._keyframes[c.match], c) for c in candidates]
+        outcomes = self._search.search(keyframe, frame, labels)
         closures = [self._closure(outcome) for outcome in outcomes if isinstance(outcome, LoopConstraint)]
         self._closures += closures
         return [closure.factor for closure in closures]
+
+    @property
+    def _last_timestamp(self) -> float | None:
+        keyframes = self._search.keyframes
+        return keyframes[-1].timestamp if keyframes else None
 
     def believed(self, graph: gtsam.NonlinearFactorGraph) -> list[Closure]:
         """Closures that semslam's own pose graph would follow, given the caller's odometry; the others are doubtful.
@@ -220,7 +213,8 @@ class LoopCloser:
     def _check(self, key: int, timestamp: float) -> None:
         if key in self._keys:
             raise GraphError(f"The key {key} was added before.")
-        if not np.isfinite(timestamp) or (self._keyframes and timestamp <= self._keyframes[-1].timestamp):
+        before = self._last_timestamp
+        if not np.isfinite(timestamp) or (before is not None and timestamp <= before):
             raise GraphError(f"The stamp {timestamp} does not lie after the keyframe before.")
 
     def _frame(self, color: npt.NDArray[np.uint8], depth: npt.NDArray[np.floating], timestamp: float) -> Frame:
@@ -231,4 +225,4 @@ class LoopCloser:
             raise DatasetError(f"A depth image must be {size} in metres, not {depth.shape} {depth.dtype}.")
         usable = np.isfinite(depth) & (depth > 0)
         metres = np.where(usable, depth, 0.0).astype(np.float32)
-        return Frame(len(self._keyframes), timestamp, color, metres, self._intrinsics)
+        return Frame(len(self._keys), timestamp, color, metres, self._intrinsics)

@@ -66,7 +66,7 @@ class Walk:
         self.follower.note(loop(self.keyframes[-1], self.keyframes[match], T))
 
     def proposed(self) -> list[int]:
-        return [candidate.match for candidate in self.follower.candidates(self.keyframes)]
+        return [candidate.match for candidate in iter(lambda: self.follower.propose(self.keyframes), None)]
 
 
 OUT_AND_BACK = [TURN * i for i in [*range(10), *reversed(range(10))]]
@@ -99,11 +99,21 @@ def test_young_and_tried_keyframes_are_left_out_and_three_are_enough() -> None:
         walk.step()
     walk.close(0)
     walk.follower.note(LoopRejection(LoopCandidate(11, 1, 0.5, "test"), RejectionReason.FEW_INLIERS, 3.0, 20.0))
-    assert walk.proposed() == [2, 3, 4]
-    assert all(11 - match >= 0.5 * GAP for match in walk.proposed())
-    for match in range(2, 2 + ENOUGH - 1):
-        walk.close(match)
-    assert walk.proposed() == []
+    proposed = walk.proposed()
+    assert proposed == [2, 3, 4]
+    assert all(11 - match >= 0.5 * GAP for match in proposed)
+
+
+def test_no_more_are_proposed_once_enough_are_verified() -> None:
+    walk = Walk([0.0] * 12, config=LoopConfig(follow=9))
+    for _ in range(12):
+        walk.step()
+    walk.close(0)
+    for _ in range(ENOUGH - 1):
+        proposed = walk.follower.propose(walk.keyframes)
+        assert proposed is not None
+        walk.close(proposed.match)
+    assert walk.follower.propose(walk.keyframes) is None
 
 
 def test_a_new_map_and_a_setting_of_zero_follow_nothing() -> None:
@@ -118,3 +128,16 @@ def test_a_new_map_and_a_setting_of_zero_follow_nothing() -> None:
         idle.step()
     idle.close(0)
     assert idle.proposed() == []
+
+
+def test_views_of_a_map_that_no_loop_has_joined_are_not_proposed() -> None:
+    walk = Walk([0.0] * 18)
+    for _ in range(4):
+        walk.step(map_id=0)
+    for _ in range(14):
+        walk.step(map_id=1)
+    walk.close(5)
+    assert set(walk.proposed()) <= set(range(4, 18))
+    walk.step(map_id=1)
+    walk.close(1)
+    assert 0 in walk.proposed(), "the loop has put the newest keyframe into the first map"

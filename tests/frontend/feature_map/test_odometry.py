@@ -12,7 +12,7 @@ from semslam.datasets import Dataset, open_dataset
 from semslam.eval.trajectory import score_trajectory
 from semslam.frontend.auto import AutoOdometry
 from semslam.frontend.feature_map.odometry import FeatureMapOdometry
-from semslam.frontend.keyframes import KeyframePolicy, make_cloud
+from semslam.frontend.surface import make_cloud
 from semslam.geometry.se3 import compose
 from semslam.types import Frame, Motion, TrackingStatus, Trajectory
 
@@ -113,18 +113,6 @@ def test_auto_goes_on_where_there_are_no_corners(kitchen: Dataset) -> None:
     with_dense = [auto.track(frame).status for frame in frames]
     assert without[4] is TrackingStatus.LOST
     assert TrackingStatus.DEGRADED in with_dense[4:]
-
-
-def test_keyframes_come_by_time_motion_and_map() -> None:
-    policy = KeyframePolicy(Config().keyframes)
-    near, far = np.eye(4), np.eye(4)
-    far[0, 3] = 0.5
-    assert policy.is_due(0.0, near, 0)
-    policy.note(0.0, near, 0)
-    assert not policy.is_due(0.3, near, 0)
-    assert policy.is_due(0.3333, near, 0)
-    assert policy.is_due(0.1, far, 0)
-    assert policy.is_due(0.1, near, 1)
 
 
 def test_cloud_lies_on_the_surface_and_looks_at_the_camera(kitchen: Dataset) -> None:

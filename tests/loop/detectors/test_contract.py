@@ -2,6 +2,7 @@
 
 import gc
 import weakref
+from dataclasses import replace
 from typing import Any
 
 import cv2
@@ -10,8 +11,7 @@ import pytest
 
 from semslam import plugins
 from semslam.config import Config
-from semslam.features import FeatureExtractor
-from semslam.frontend.keyframes import make_keyframe
+from semslam.frontend.keyframes import KeyframeBuilder
 from semslam.geometry.camera import Intrinsics
 from semslam.loop.detector import LoopDetector
 from semslam.types import Frame, KeyframeView, LabelMap, LoopCandidate
@@ -19,7 +19,7 @@ from semslam.types import Frame, KeyframeView, LabelMap, LoopCandidate
 NAMES = ("void", "wall", "floor", "chair", "table", "bed")
 CAMERA = Intrinsics(320, 240, 260, 260, 159.5, 119.5)
 CONFIG = Config().with_changes(loops={"min_score": 0.0})
-EXTRACTOR = FeatureExtractor(CONFIG.keypoints)
+BUILDER = KeyframeBuilder(CONFIG, details=False)
 
 
 def view(identity: int, place: int, timestamp: float | None = None) -> KeyframeView:
@@ -36,7 +36,7 @@ def view(identity: int, place: int, timestamp: float | None = None) -> KeyframeV
         depth[box] = rng.uniform(1, 3)
     stamp = 10.0 * identity if timestamp is None else timestamp
     frame = Frame(identity, stamp, color, depth, CAMERA)
-    keyframe = make_keyframe(identity, frame, np.eye(4), 0, EXTRACTOR.extract(frame), CONFIG.keyframes)
+    keyframe = replace(BUILDER.build_at(frame, np.eye(4)), id=identity)
     return KeyframeView(keyframe, color, depth, LabelMap(labels, NAMES))
 
 
@@ -115,7 +115,7 @@ def test_a_blank_view_is_no_error(name: str) -> None:
     blank = np.zeros((240, 320, 3), np.uint8)
     hollow = np.zeros((240, 320), np.float32)
     frame = Frame(60, 600.0, blank, hollow, CAMERA)
-    keyframe = make_keyframe(60, frame, np.eye(4), 0, EXTRACTOR.extract(frame), CONFIG.keyframes)
+    keyframe = replace(BUILDER.build_at(frame, np.eye(4)), id=60)
     dark = KeyframeView(keyframe, blank, hollow, LabelMap(np.zeros((240, 320), np.uint8), NAMES))
     assert all(np.isfinite(candidate.score) for candidate in detector.query(dark))
     detector.add(dark)

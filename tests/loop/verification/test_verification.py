@@ -232,19 +232,15 @@ def test_free_space_is_violated_by_points_in_front_only() -> None:
 def test_real_neighbours_are_verified_at_the_true_pose_and_strangers_are_not(shared, name: str) -> None:
     from semslam.datasets import open_dataset
     from semslam.eval.trajectory import poses_at
-    from semslam.features import FeatureExtractor
-    from semslam.frontend.keyframes import make_keyframe
+    from semslam.frontend.keyframes import KeyframeBuilder
 
     config = Config()
-    extractor = FeatureExtractor(config.keypoints)
+    builder = KeyframeBuilder(config, details=False)
     dataset = open_dataset(shared / "data" / name)
     frames = [dataset.frame(index) for index in (0, 10)]
     other = "redkitchen" if name != "redkitchen" else "rgbd_dataset_freiburg1_rpy_first10s"
     frames.append(open_dataset(shared / "data" / other).frame(100))
-    keyframes = [
-        make_keyframe(i, frame, np.eye(4), 0, extractor.extract(frame), config.keyframes)
-        for i, frame in enumerate(frames)
-    ]
+    keyframes = [builder.build_at(frame, np.eye(4)) for frame in frames]
     poses, _ = poses_at(dataset.ground_truth, [frame.timestamp for frame in frames[:2]])
     loop = verify(keyframes[1], keyframes[0])
     assert isinstance(loop, LoopConstraint)
@@ -256,21 +252,17 @@ def test_real_neighbours_are_verified_at_the_true_pose_and_strangers_are_not(sha
 
 def test_no_wrong_place_is_accepted_among_the_keyframes_of_three_places(shared) -> None:
     from semslam.datasets import open_dataset
-    from semslam.features import FeatureExtractor
-    from semslam.frontend.keyframes import make_keyframe
+    from semslam.frontend.keyframes import KeyframeBuilder
 
     config = Config()
-    extractor, details = FeatureExtractor(config.keypoints), FeatureExtractor(config.verification.keypoints)
+    builder = KeyframeBuilder(config)
     data = shared / "data"
     places = (data / "redkitchen", data / "rgbd_dataset_freiburg1_rpy_first10s", "synthetic:room?frames=60")
     mixed: list[tuple[int, Keyframe]] = []
     for place, path in enumerate(places):
         dataset = open_dataset(path)
-        for index in range(0, len(dataset), -(-len(dataset) // 4)):
-            frame = dataset.frame(index)
-            found = (extractor.extract(frame), details.extract(frame))
-            keyframe = make_keyframe(len(mixed), frame, np.eye(4), 0, found[0], config.keyframes, found[1])
-            mixed.append((place, keyframe))
+        chosen = range(0, len(dataset), -(-len(dataset) // 4))
+        mixed += [(place, builder.build_at(dataset.frame(index), np.eye(4))) for index in chosen]
     verifier = IcpVerifier.from_config(config)
     accepted = [
         (query.id, match.id)

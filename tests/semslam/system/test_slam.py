@@ -7,13 +7,16 @@ import numpy as np
 import pytest
 
 from semslam.backend.pose_graph import GraphSolution, PoseGraph
-from semslam.config import Config
+from semslam.config import Config, LoopConfig
 from semslam.errors import GraphError
+from semslam.frontend.keyframes import KeyframeBuilder
 from semslam.geometry.camera import Intrinsics
 from semslam.geometry.se3 import FloatArray, exp_so3, invert, make_transform
+from semslam.loop.search import LoopSearch
 from semslam.runtime.stopwatch import Stopwatch
 from semslam.system.recovery import recover_poses
-from semslam.system.slam import Slam, SlamResult
+from semslam.system.result import SlamResult
+from semslam.system.slam import Slam
 from semslam.types import (
     Cloud,
     Features,
@@ -91,9 +94,8 @@ def run_ring(**script: object) -> tuple[FloatArray, SlamResult]:
     refuse = bool(script.pop("refuse", False))
     slam = Slam(
         ScriptedOdometry(truth, **script),  # type: ignore[arg-type]
-        None,
-        LastSeesFirst(after=15),
-        TruthfulVerifier(truth, refuse),
+        KeyframeBuilder(Config()),
+        LoopSearch(LastSeesFirst(after=15), None, TruthfulVerifier(truth, refuse), LoopConfig()),
         PoseGraph(Config().backend),
         Config(),
         Stopwatch(),
@@ -144,9 +146,8 @@ def test_two_maps_are_joined_by_a_loop_alone() -> None:
 
 
 def test_finishing_before_a_frame_is_an_error_and_not_a_result() -> None:
-    slam = Slam(
-        ScriptedOdometry(ring(3)), None, LastSeesFirst(0), TruthfulVerifier(ring(3)), PoseGraph(), Config(), Stopwatch()
-    )
+    search = LoopSearch(LastSeesFirst(0), None, TruthfulVerifier(ring(3)), LoopConfig())
+    slam = Slam(ScriptedOdometry(ring(3)), KeyframeBuilder(Config()), search, PoseGraph(), Config(), Stopwatch())
     with pytest.raises(GraphError):
         slam.finish()
 

@@ -7,8 +7,7 @@ from semslam.backend.pose_graph import PoseGraph
 from semslam.config import Config
 from semslam.datasets import open_dataset
 from semslam.eval.trajectory import poses_at
-from semslam.features import FeatureExtractor
-from semslam.frontend.keyframes import make_keyframe
+from semslam.frontend.keyframes import KeyframeBuilder
 from semslam.geometry.se3 import FloatArray, invert, make_transform, rotation_angle
 from semslam.loop.verification.icp import IcpVerifier
 from semslam.types import Keyframe, LoopCandidate, LoopConstraint
@@ -30,14 +29,12 @@ def test_loops_between_twin_rooms_pass_verification_and_not_the_graph() -> None:
     assert dataset.ground_truth is not None
     poses, _ = poses_at(dataset.ground_truth, [dataset.timestamps[i] for i in indices])
     again = next(k for k in range(60, len(indices)) if np.linalg.norm(poses[k, :3, 3] - poses[0, :3, 3]) < 0.3)
-    extractor, details = FeatureExtractor(config.keypoints), FeatureExtractor(config.verification.keypoints)
+    builder = KeyframeBuilder(config)
     made: dict[int, Keyframe] = {}
 
     def keyframe(k: int) -> Keyframe:
         if k not in made:
-            frame = dataset.frame(indices[k])
-            found = (extractor.extract(frame), details.extract(frame))
-            made[k] = make_keyframe(k, frame, np.eye(4), 0, found[0], config.keyframes, found[1])
+            made[k] = builder.build_at(dataset.frame(indices[k]), np.eye(4))
         return made[k]
 
     first_room = range(2, 14, 3)

@@ -1,0 +1,70 @@
+"""What SLAM knows: of a frame that has been processed, and of a finished run."""
+
+from dataclasses import dataclass
+
+from semslam.backend.pose_graph import GraphSolution
+from semslam.types import FloatArray, Keyframe, LoopCandidate, LoopOutcome, Motion, TrackingStatus
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FrameState:
+    """What is known of a frame once it has been processed.
+
+    Attributes:
+        index: its place in the sequence.
+        timestamp: seconds.
+        motion: the odometry's; observations are kept of keyframes only.
+        T_odom_cam: (4, 4) causal odometry pose.
+        keyframe: id of the keyframe made of it, if any.
+    """
+
+    index: int
+    timestamp: float
+    motion: Motion
+    T_odom_cam: FloatArray
+    keyframe: int | None
+
+    @property
+    def status(self) -> TrackingStatus:
+        """How far its pose can be trusted."""
+        return self.motion.status
+
+    @property
+    def map_id(self) -> int:
+        """The odometry's map it belongs to."""
+        return self.motion.map_id
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SlamResult:
+    """What a finished run knows.
+
+    Attributes:
+        frames: the state of every frame, in order.
+        keyframes: in order of their ids.
+        candidates: what the detector proposed, in order.
+        outcomes: what the verification made of each candidate.
+        solution: optimised keyframe poses and a verdict for each verified loop.
+        poses: (N, 4, 4) optimised T_world_cam of every frame.
+        components: for each frame the map it ends in, 0 the largest; maps that a loop joined share a number.
+        notes: what could not be done, a sentence each.
+    """
+
+    frames: tuple[FrameState, ...]
+    keyframes: tuple[Keyframe, ...]
+    outcomes: tuple[LoopOutcome, ...]
+    solution: GraphSolution
+    poses: FloatArray
+    components: tuple[int, ...]
+    notes: tuple[str, ...] = ()
+
+    @property
+    def largest_map(self) -> tuple[Keyframe, ...]:
+        """Keyframes of the largest connected component."""
+        inside = set(self.solution.components[0])
+        return tuple(keyframe for keyframe in self.keyframes if keyframe.id in inside)
+
+    @property
+    def candidates(self) -> tuple[LoopCandidate, ...]:
+        """What the detector proposed, in the order of ``outcomes``."""
+        return tuple(outcome.candidate for outcome in self.outcomes)
