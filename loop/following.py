@@ -90,7 +90,7 @@ class LoopFollower:
         return LoopCandidate(query, match, share, self.name, LoopEvidence(figures={"predicted_overlap": share}))
 
     def _seen(self, query: Keyframe, keyframes: Sequence[Keyframe]) -> FloatArray:
-        """Share (N,) of the query's points that each earlier view holds; 0 for too young ones and those of another map."""
+        """Share (N,) of the query's points that each earlier view holds; 0 for those too young or of another map."""
         cloud = query.cloud.points
         points = transform_points(self._poses[-1], cloud[:: max(len(cloud) // POINTS, 1)].astype(np.float64))
         gap = GAP_SHARE * self._config.min_gap

@@ -86,7 +86,7 @@ def compare_detectors(
 def keyframe_views(
     dataset: Dataset, config: Config, every: int, needs_labels: bool, report: Report = lambda _done, _total: None
 ) -> Iterator[KeyframeView]:
-    """Every ``every``-th frame as a keyframe with its images, tracked by the configured odometry; lost ones are skipped.
+    """Every ``every``-th frame as a keyframe with its images, tracked by the configured odometry, lost ones excepted.
 
     Raises:
         DatasetError: a keyframe's image cannot be read.

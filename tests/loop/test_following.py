@@ -131,7 +131,7 @@ def test_a_new_map_and_a_setting_of_zero_follow_nothing() -> None:
 
 
 def test_views_of_a_map_that_no_loop_has_joined_are_not_proposed() -> None:
-    walk = Walk([0.0] * 18)
+    walk = Walk([0.0] * 19)
     for _ in range(4):
         walk.step(map_id=0)
     for _ in range(14):
