@@ -8,7 +8,6 @@ look away from each other.
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from enum import StrEnum
 from typing import Protocol
 
 import cv2
@@ -18,7 +17,7 @@ import numpy.typing as npt
 from semslam.eval.trajectory import BoolArray, poses_at
 from semslam.geometry.camera import Intrinsics
 from semslam.geometry.se3 import Float32Array, FloatArray, invert, rotation_angle, transform_points
-from semslam.types import Keyframe, LoopConstraint, Trajectory
+from semslam.types import JudgedLoop, Keyframe, LoopConstraint, LoopJudgement, Trajectory
 
 STEP = 16
 OFFSET = 8
@@ -78,33 +77,11 @@ class LoopTruth:
         return self.timestamps[:, None] - self.timestamps[None, :] >= self.min_gap - 1e-9
 
 
-class LoopJudgement(StrEnum):
-    """What ground truth says of an accepted loop."""
-
-    TRUE = "true"
-    INACCURATE = "inaccurate"
-    FALSE = "false"
-
-
-@dataclass(frozen=True, slots=True)
-class JudgedLoop:
-    """A loop against ground truth: its kind, and the error of its relative pose in metres and degrees."""
-
-    judgement: LoopJudgement
-    translation_m: float
-    rotation_deg: float
-
-
 def make_view(depth: Float32Array, intrinsics: Intrinsics) -> DepthView:
     """Sample a depth image (H, W) in metres: every 16th pixel from the 8th, 0.2 to 6 m."""
     points = intrinsics.back_project(depth, STEP, OFFSET)
     points = points[(points[:, 2] >= MIN_DEPTH) & (points[:, 2] <= MAX_DEPTH)]
-    if intrinsics.is_distorted:
-        maps = cv2.initUndistortRectifyMap(
-            intrinsics.matrix, np.array(intrinsics.distortion), np.eye(3), intrinsics.matrix,
-            (intrinsics.width, intrinsics.height), cv2.CV_32FC1,
-        )  # fmt: skip
-        depth = cv2.remap(depth, *maps, cv2.INTER_NEAREST)  # type: ignore[assignment]
+    depth = intrinsics.undistort_image(depth, cv2.INTER_NEAREST)
     ideal = Intrinsics(intrinsics.width, intrinsics.height, intrinsics.fx, intrinsics.fy, intrinsics.cx, intrinsics.cy)
     millimetres = (depth * 1000.0).round().clip(0, np.iinfo(np.uint16).max).astype(np.uint16)
     return DepthView(points.astype(np.float32), millimetres, ideal)

@@ -15,7 +15,7 @@ from semslam.cli.console import out, remark
 from semslam.errors import ConfigError
 
 if TYPE_CHECKING:
-    from semslam.runs.ledger import LedgerEntry, LoopContribution
+    from semslam.types import LedgerEntry, LoopContribution
 
 RunFolder = Annotated[Path, typer.Argument(help="A run folder.")]
 
@@ -28,11 +28,11 @@ def ledger_command(
     as_json: options.Json = False,
 ) -> None:
     """Print the loop candidates of a run and what became of each."""
-    from semslam.runs.ledger import Verdict
     from semslam.runs.results import read_ledger
+    from semslam.types import LoopOutcome
 
-    if verdict is not None and verdict not in set(Verdict):
-        raise ConfigError(f"There is no verdict '{verdict}'. Known: {', '.join(Verdict)}.")
+    if verdict is not None and verdict not in set(LoopOutcome):
+        raise ConfigError(f"There is no verdict '{verdict}'. Known: {', '.join(LoopOutcome)}.")
     chosen = [
         entry
         for entry in read_ledger(run / "loops.jsonl")

@@ -9,9 +9,8 @@ from semslam.backend.analysis.contribution import leave_one_out
 from semslam.backend.graph.products import GraphSolution
 from semslam.config import BackendConfig
 from semslam.errors import TrajectoryError
-from semslam.eval.trajectory import Pairs, associate, fit_alignment
-from semslam.runs.ledger import LoopContribution
-from semslam.types import FloatArray, Keyframe, Trajectory
+from semslam.eval.trajectory import Pairs, associate, rmse_after_alignment
+from semslam.types import FloatArray, Keyframe, LoopContribution, Trajectory
 
 
 def loop_contributions(
@@ -64,6 +63,4 @@ class _KeyframeError:
         return self._ate(self._pairs, poses) - self._ate(self._pairs, reference)
 
     def _ate(self, pairs: Pairs, poses: Mapping[int, FloatArray]) -> float:
-        moved = replace(pairs, estimated=np.stack([poses[key] for key in self._keys]))
-        errors = fit_alignment(moved).apply(moved.estimated)[:, :3, 3] - moved.true[:, :3, 3]
-        return float(np.sqrt((errors**2).sum(1).mean()))
+        return rmse_after_alignment(replace(pairs, estimated=np.stack([poses[key] for key in self._keys])))

@@ -1,146 +1,28 @@
-"""The loop ledger: one entry per candidate, from proposal to verdict."""
+"""Ledger entries out of a finished run: one per candidate."""
 
-import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
-from enum import StrEnum
 from typing import Any
 
-from semslam.errors import ResultsError
-from semslam.eval.loops.truth import JudgedLoop, LoopJudgement
-from semslam.types import FloatArray, Keyframe, LoopConstraint, LoopEvidence, LoopRejection, NodePair
-
-
-class Verdict(StrEnum):
-    """What became of a candidate."""
-
-    ACCEPTED = "accepted"
-    REJECTED = "rejected"
-    WITHDRAWN = "withdrawn"
-
-
-@dataclass(frozen=True, slots=True)
-class LoopContribution:
-    """What an accepted loop brought, by the pose graph without it.
-
-    Attributes:
-        tension: squared Mahalanobis distance that the other measurements gain when it goes; about 6 where it agrees
-            with them as stated, large where it pulls against them.
-        shift_m: root mean square movement of the keyframes without it, metres.
-        ate_gain_m: by how much the keyframes' ATE grows without it, metres, where there is ground truth; negative
-            for a loop that did harm.
-    """
-
-    tension: float
-    shift_m: float
-    ate_gain_m: float | None
-
-
-@dataclass(frozen=True, slots=True)
-class LedgerEntry:
-    """All that is known of one loop candidate.
-
-    Attributes:
-        query: id of the newer keyframe.
-        match: id of the older one.
-        query_frame: frame index of the query.
-        match_frame: frame index of the match.
-        query_time: seconds.
-        match_time: seconds.
-        detector: who proposed it.
-        score: the detector's score, 0..1.
-        evidence: what agreed.
-        verdict: rejected by the verification, withdrawn by the graph, or accepted.
-        reason: the test that failed, or None.
-        figure: the value that failed, or None.
-        limit: the value it should have met, or None.
-        method: the pose estimate that was kept, or None.
-        inliers: feature matches behind the pose, or None.
-        fitness: share of points that meet the other surface, or None.
-        inlier_rmse_m: metres, or None.
-        overlap: the smaller two-way overlap, or None.
-        figures: what the verification's steps measured, by name, or None.
-        T_match_query: rows of the (4, 4) relative pose, or None.
-        weight: the back end's weight, 0..1, or None.
-        truth: the judgement and pose error, where the loop was verified and ground truth covers both frames.
-        contribution: what the loop brought, where it was accepted and that was worked out.
-    """
-
-    query: int
-    match: int
-    query_frame: int
-    match_frame: int
-    query_time: float
-    match_time: float
-    detector: str
-    score: float
-    evidence: LoopEvidence
-    verdict: Verdict
-    reason: str | None = None
-    figure: float | None = None
-    limit: float | None = None
-    method: str | None = None
-    inliers: int | None = None
-    fitness: float | None = None
-    inlier_rmse_m: float | None = None
-    overlap: float | None = None
-    figures: dict[str, float] | None = None
-    T_match_query: list[list[float]] | None = None
-    weight: float | None = None
-    truth: JudgedLoop | None = None
-    contribution: LoopContribution | None = None
-
-    def to_json(self) -> str:
-        """One line of JSON."""
-        return json.dumps(asdict(self), allow_nan=False)
-
-    @classmethod
-    def from_json(cls, line: str) -> "LedgerEntry":
-        """Read a line written by ``to_json``.
-
-        Raises:
-            ResultsError: the line is no ledger entry.
-        """
-        try:
-            values: dict[str, Any] = json.loads(line)
-            evidence = values["evidence"]
-            values["evidence"] = LoopEvidence(
-                labels=tuple(evidence["labels"]),
-                nodes=tuple(
-                    NodePair(node["label"], tuple(node["query_uvd"]), tuple(node["match_uvd"]))
-                    for node in evidence["nodes"]
-                ),
-                figures=evidence["figures"],
-            )
-            values["verdict"] = Verdict(values["verdict"])
-            truth = values["truth"]
-            values["truth"] = truth and JudgedLoop(
-                LoopJudgement(truth["judgement"]), truth["translation_m"], truth["rotation_deg"]
-            )
-            contribution = values.get("contribution")
-            values["contribution"] = contribution and LoopContribution(**contribution)
-            return cls(**values)
-        except (KeyError, TypeError, ValueError) as error:
-            raise ResultsError(f"This is not a line of a loop ledger: {line[:80]!r}.") from error
-
-
-@dataclass(frozen=True, slots=True)
-class GraphVerdict:
-    """What the graph said of a verified loop: what it brought, or the test it failed with its figure and limit."""
-
-    weight: float
-    accepted: bool
-    contribution: LoopContribution | None = None
-    reason: str | None = None
-    figure: float | None = None
-    limit: float | None = None
+from semslam.backend.graph.products import LoopVerdict
+from semslam.config import BackendConfig
+from semslam.types import (
+    FloatArray,
+    JudgedLoop,
+    Keyframe,
+    LedgerEntry,
+    LoopContribution,
+    LoopOutcome,
+    LoopRejection,
+    RejectionReason,
+    Verification,
+)
 
 
 def rejected_entry(rejection: LoopRejection, keyframes: Sequence[Keyframe]) -> LedgerEntry:
     """The entry of a candidate that the verification refused."""
     return LedgerEntry(
         **_identity(rejection, keyframes),
-        verdict=Verdict.REJECTED,
+        verdict=LoopOutcome.REJECTED,
         reason=rejection.reason.value,
         figure=rejection.figure,
         limit=rejection.limit,
@@ -148,16 +30,30 @@ def rejected_entry(rejection: LoopRejection, keyframes: Sequence[Keyframe]) -> L
 
 
 def verified_entry(
-    constraint: LoopConstraint, keyframes: Sequence[Keyframe], graph: GraphVerdict, truth: JudgedLoop | None
+    verdict: LoopVerdict,
+    keyframes: Sequence[Keyframe],
+    config: BackendConfig,
+    truth: JudgedLoop | None,
+    contribution: LoopContribution | None,
 ) -> LedgerEntry:
-    """The entry of a verified candidate, with the graph's verdict."""
+    """The entry of a verified candidate.
+
+    Args:
+        verdict: the graph's.
+        keyframes: ``keyframes[i].id`` is i.
+        config: the limits that the graph applied.
+        truth: the loop against ground truth, where that covers both keyframes.
+        contribution: what the loop brought, where it was accepted and that was computed.
+    """
+    constraint = verdict.constraint
     pose: FloatArray = constraint.T_match_query
+    value, limit = _failed_test(verdict, config)
     return LedgerEntry(
         **_identity(constraint, keyframes),
-        verdict=Verdict.ACCEPTED if graph.accepted else Verdict.WITHDRAWN,
-        reason=graph.reason,
-        figure=graph.figure,
-        limit=graph.limit,
+        verdict=LoopOutcome.ACCEPTED if verdict.accepted else LoopOutcome.WITHDRAWN,
+        reason=None if verdict.reason is None else verdict.reason.value,
+        figure=value,
+        limit=limit,
         method=constraint.method,
         inliers=constraint.inliers,
         fitness=constraint.fitness,
@@ -165,13 +61,22 @@ def verified_entry(
         overlap=constraint.overlap,
         figures=constraint.figures,
         T_match_query=pose.tolist(),
-        weight=graph.weight,
+        weight=verdict.weight,
         truth=truth,
-        contribution=graph.contribution,
+        contribution=contribution,
     )
 
 
-def _identity(outcome: LoopConstraint | LoopRejection, keyframes: Sequence[Keyframe]) -> Mapping[str, Any]:
+def _failed_test(verdict: LoopVerdict, config: BackendConfig) -> tuple[float | None, float | None]:
+    """Value and limit of the test that a loop failed; an ambiguous one fails against other loops, by no value."""
+    if verdict.reason is RejectionReason.OUTLIER:
+        return verdict.residual, config.max_residual
+    if verdict.reason is RejectionReason.INCONSISTENT:
+        return verdict.drift, config.drift_slack * config.max_residual
+    return None, None
+
+
+def _identity(outcome: Verification, keyframes: Sequence[Keyframe]) -> Mapping[str, Any]:
     candidate = outcome.candidate
     query, match = keyframes[candidate.query], keyframes[candidate.match]
     return {

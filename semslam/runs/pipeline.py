@@ -11,14 +11,13 @@ from semslam.datasets.dataset import Dataset
 from semslam.datasets.prefetch import prefetch
 from semslam.errors import DatasetError
 from semslam.loop.verification.verifier import LoopVerifier
-from semslam.runs.ledger import LedgerEntry
 from semslam.runs.metrics import Metrics, TimeMetrics
 from semslam.runs.recording import RecordedFrame, Recording, checksum
 from semslam.runs.scoring import score_run
 from semslam.runtime.stopwatch import Stopwatch
 from semslam.system.result import FrameState, SlamResult
 from semslam.system.slam import Slam
-from semslam.types import Trajectory
+from semslam.types import LedgerEntry, Trajectory
 
 Progress = Callable[[int, FrameState | None], None]
 

@@ -8,10 +8,9 @@ from semslam.errors import DatasetError
 from semslam.eval.report.page import ErrorRow, ReportInput, ReportLoop, loops_to_show, make_report
 from semslam.eval.report.plots import LoopMark, RunDrawing, draw_run
 from semslam.eval.style import LoopKind
-from semslam.runs.ledger import LedgerEntry, Verdict
 from semslam.runs.metrics import Metrics
 from semslam.runs.pipeline import RunResult
-from semslam.types import UInt8Array
+from semslam.types import LedgerEntry, LoopOutcome, UInt8Array
 
 ERRORS = {
     "ate_rmse_m": ("ATE (RMSE)", "m"),
@@ -70,7 +69,7 @@ def report_input(result: RunResult, dataset: Dataset, pictures: Mapping[str, byt
 
 def loop_kind(entry: LedgerEntry) -> LoopKind:
     """How a candidate is drawn."""
-    if entry.verdict is Verdict.ACCEPTED:
+    if entry.verdict is LoopOutcome.ACCEPTED:
         return LoopKind.ACCEPTED if entry.truth is None else LoopKind(entry.truth.judgement.value)
     return LoopKind(entry.verdict.value)
 

@@ -21,12 +21,11 @@ from semslam.datasets.dataset import Dataset
 from semslam.datasets.tum_format import read_trajectory, write_trajectory
 from semslam.errors import ResultsError
 from semslam.maps.cloud import write_map
-from semslam.runs.ledger import LedgerEntry
 from semslam.runs.metrics import Metrics
 from semslam.runs.pipeline import RunResult
 from semslam.runs.presentation import present
 from semslam.runs.recording import write_recording
-from semslam.types import Keyframe, Trajectory
+from semslam.types import Keyframe, LedgerEntry, Trajectory
 
 
 @dataclass(frozen=True, slots=True, eq=False)

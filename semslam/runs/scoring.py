@@ -6,17 +6,24 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from semslam.backend.graph.products import LoopVerdict
-from semslam.config import BackendConfig, Config
+from semslam.config import Config
 from semslam.datasets.dataset import Dataset
 from semslam.errors import TrajectoryError
-from semslam.eval.loops.truth import JudgedLoop, LoopJudgement, judge_loops
+from semslam.eval.loops.truth import judge_loops
 from semslam.eval.trajectory import TrajectoryScore, coverage, score_trajectory
 from semslam.runs.contributions import loop_contributions
-from semslam.runs.ledger import GraphVerdict, LedgerEntry, LoopContribution, Verdict, rejected_entry, verified_entry
+from semslam.runs.ledger import rejected_entry, verified_entry
 from semslam.runs.metrics import LoopMetrics, Metrics, TimeMetrics, TrajectoryMetrics
 from semslam.system.result import FrameState, SlamResult
-from semslam.types import LoopConstraint, RejectionReason, TrackingStatus, Trajectory
+from semslam.types import (
+    JudgedLoop,
+    LedgerEntry,
+    LoopConstraint,
+    LoopJudgement,
+    LoopOutcome,
+    TrackingStatus,
+    Trajectory,
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -109,23 +116,10 @@ def _ledger(dataset: Dataset, slam: SlamResult, config: Config) -> tuple[LedgerE
     for outcome in slam.outcomes:
         if isinstance(outcome, LoopConstraint):
             verdict, truth, contribution = next(verdicts)
-            entries.append(
-                verified_entry(outcome, slam.keyframes, _graph_verdict(verdict, contribution, config.backend), truth)
-            )
+            entries.append(verified_entry(verdict, slam.keyframes, config.backend, truth, contribution))
         else:
             entries.append(rejected_entry(outcome, slam.keyframes))
     return tuple(entries)
-
-
-def _graph_verdict(verdict: LoopVerdict, contribution: LoopContribution | None, config: BackendConfig) -> GraphVerdict:
-    """The verdict with the figure that failed; an ambiguous loop fails against other loops, by no figure of its own."""
-    figure, limit = None, None
-    if verdict.reason is RejectionReason.OUTLIER:
-        figure, limit = verdict.residual, config.max_residual
-    elif verdict.reason is RejectionReason.INCONSISTENT:
-        figure, limit = verdict.drift, config.drift_slack * config.max_residual
-    reason = None if verdict.reason is None else verdict.reason.value
-    return GraphVerdict(verdict.weight, verdict.accepted, contribution, reason, figure, limit)
 
 
 def _truths(dataset: Dataset, slam: SlamResult) -> Sequence[JudgedLoop | None]:
@@ -137,7 +131,7 @@ def _truths(dataset: Dataset, slam: SlamResult) -> Sequence[JudgedLoop | None]:
 
 
 def _loop_metrics(slam: SlamResult, ledger: Sequence[LedgerEntry], truth_is_known: bool) -> LoopMetrics:
-    accepted = [entry for entry in ledger if entry.verdict is Verdict.ACCEPTED]
+    accepted = [entry for entry in ledger if entry.verdict is LoopOutcome.ACCEPTED]
     kinds = Counter(entry.truth.judgement for entry in accepted if entry.truth is not None)
     known = truth_is_known and (not accepted or bool(kinds))
     return LoopMetrics(

@@ -9,14 +9,15 @@ from semslam.types.arrays import Float32Array, FloatArray, IntArray, UInt8Array
 from semslam.types.features import Cloud, Features
 from semslam.types.images import Frame, LabelMap
 from semslam.types.keyframes import Keyframe, KeyframeView
+from semslam.types.ledger import JudgedLoop, LedgerEntry, LoopContribution, LoopJudgement, LoopOutcome
 from semslam.types.loops import (
     LoopCandidate,
     LoopConstraint,
     LoopEvidence,
-    LoopOutcome,
     LoopRejection,
     NodePair,
     RejectionReason,
+    Verification,
 )
 from semslam.types.tracking import Motion, Observations, TrackingStatus
 from semslam.types.trajectory import Trajectory
@@ -29,12 +30,16 @@ __all__ = [
     "Frame",
     "IntArray",
     "Intrinsics",
+    "JudgedLoop",
     "Keyframe",
     "KeyframeView",
     "LabelMap",
+    "LedgerEntry",
     "LoopCandidate",
     "LoopConstraint",
+    "LoopContribution",
     "LoopEvidence",
+    "LoopJudgement",
     "LoopOutcome",
     "LoopRejection",
     "Motion",
@@ -44,4 +49,5 @@ __all__ = [
     "TrackingStatus",
     "Trajectory",
     "UInt8Array",
+    "Verification",
 ]

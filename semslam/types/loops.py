@@ -117,5 +117,5 @@ class LoopRejection:
     limit: float
 
 
-LoopOutcome = LoopConstraint | LoopRejection
+Verification = LoopConstraint | LoopRejection
 """What the verification makes of a candidate."""

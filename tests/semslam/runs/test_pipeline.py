@@ -10,10 +10,9 @@ import pytest
 
 from semslam.config import Config
 from semslam.errors import DatasetError, GraphError, ResultsError
-from semslam.runs.ledger import LedgerEntry, Verdict
 from semslam.runs.pipeline import run
 from semslam.runs.results import new_run_directory, read_ledger, read_run, write_ledger, write_run
-from semslam.types import LoopEvidence, NodePair
+from semslam.types import LedgerEntry, LoopEvidence, LoopOutcome, NodePair
 from tests.conftest import WallDataset
 
 ALONE = Config(detector="none")
@@ -105,7 +104,9 @@ def test_a_folder_that_is_no_run_is_named(tmp_path: Path) -> None:
 
 def test_a_ledger_reads_back(tmp_path: Path) -> None:
     evidence = LoopEvidence(("chair",), (NodePair("chair", (1.0, 2.0, 3.0), (1.5, 2.5, 3.5)),), {"share": 0.75})
-    entry = LedgerEntry(9, 1, 90, 10, 9.0, 1.0, "semantic", 0.8, evidence, Verdict.REJECTED, "few_inliers", 7.0, 20.0)
+    entry = LedgerEntry(
+        9, 1, 90, 10, 9.0, 1.0, "semantic", 0.8, evidence, LoopOutcome.REJECTED, "few_inliers", 7.0, 20.0
+    )
     write_ledger(tmp_path / "loops.jsonl", (entry, entry))
     assert read_ledger(tmp_path / "loops.jsonl") == (entry, entry)
     assert json.loads((tmp_path / "loops.jsonl").read_text().splitlines()[0])["reason"] == "few_inliers"
