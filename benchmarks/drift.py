@@ -38,8 +38,9 @@ from semslam import plugins
 from semslam.config import Config
 from semslam.datasets import Dataset, open_dataset
 from semslam.datasets.selection import Selection
+from semslam.eval.nees import DEGREES_OF_FREEDOM, nees
 from semslam.eval.trajectory import poses_at
-from semslam.geometry.se3 import adjoint, invert, tangent
+from semslam.geometry.se3 import adjoint, invert
 from semslam.loop.verification.icp import IcpVerifier
 from semslam.runs.metrics import Metrics
 from semslam.runs.pipeline import replay, run
@@ -242,7 +243,7 @@ def normalised_errors(recording: Recording, dataset: Dataset) -> FloatArray:
     stamps = [frame.timestamp for frame in frames]
     truth, known = poses_at(dataset.ground_truth, stamps)
     stride = max(round(Config().keyframes.interval / float(np.median(np.diff(stamps)))), 1)
-    errors = []
+    errors, covariances = [], []
     for first in range(0, len(frames) - stride, stride):
         last, T, covariance = first + stride, np.eye(4), np.zeros((6, 6))
         motions = [frame.motion for frame in frames[first + 1 : last + 1]]
@@ -252,9 +253,9 @@ def normalised_errors(recording: Recording, dataset: Dataset) -> FloatArray:
             carry = adjoint(invert(motion.T_prev_cur))
             covariance = carry @ covariance @ carry.T + motion.covariance
             T = T @ motion.T_prev_cur
-        error = tangent(invert(T) @ invert(truth[first]) @ truth[last])
-        errors.append(float(error @ np.linalg.solve(covariance, error)) / 6)
-    return np.array(errors)
+        errors.append(invert(invert(truth[first]) @ truth[last]) @ T)
+        covariances.append(covariance)
+    return nees(np.array(errors).reshape(-1, 4, 4), np.array(covariances).reshape(-1, 6, 6)) / DEGREES_OF_FREEDOM
 
 
 def line(rows: Sequence[Row], sequence: str, odometry: str, detectors: Sequence[str], best: float) -> str:

@@ -22,9 +22,10 @@ from semslam import plugins
 from semslam.config import Config
 from semslam.datasets import open_dataset
 from semslam.eval.loops.truth import ANGLE_TOLERANCE, POSE_TOLERANCE, LoopTruth, find_loop_truth, make_view
+from semslam.eval.nees import nees
 from semslam.eval.trajectory import poses_at
 from semslam.frontend.keyframes import KeyframeBuilder
-from semslam.geometry.se3 import FloatArray, invert, rotation_angle, tangent
+from semslam.geometry.se3 import FloatArray, invert, rotation_angle
 from semslam.loop.detector import LoopDetector
 from semslam.loop.segmentation.build import build_segmenter
 from semslam.loop.verification.icp import IcpVerifier
@@ -88,12 +89,14 @@ def report(part: Part) -> None:
     """Print a sequence's figures."""
     elsewhere = [loop for loop in part.loops if loop.candidate.match < part.first]
     here = [loop for loop in part.loops if loop.candidate.match >= part.first]
-    errors, squared, good, wrong = [], [], set(), len(elsewhere)
+    errors, good, wrong = [], set(), len(elsewhere)
+    squared = nees(
+        np.array([error_of(part, loop) for loop in here]).reshape(-1, 4, 4),
+        np.array([loop.covariance for loop in here]).reshape(-1, 6, 6),
+    )
     for loop in here:
         query, match = loop.candidate.query - part.first, loop.candidate.match - part.first
         E = error_of(part, loop)
-        error = tangent(E)
-        squared.append(float(error @ np.linalg.solve(loop.covariance, error)))
         errors.append((float(np.linalg.norm(E[:3, 3])), float(np.degrees(rotation_angle(E)))))
         if errors[-1][0] <= POSE_TOLERANCE and errors[-1][1] <= ANGLE_TOLERANCE:
             good.add(query)

@@ -1,6 +1,4 @@
-"""Whether stated covariances are believable: squared errors measured in them (NEES; Bar-Shalom et al., 2001)."""
-
-from dataclasses import dataclass
+"""Whether stated covariances are right: squared errors normalised by them (NEES; Bar-Shalom et al., 2001)."""
 
 import numpy as np
 
@@ -8,23 +6,6 @@ from semslam.errors import TrajectoryError
 from semslam.geometry.se3 import FloatArray, log_so3
 
 DEGREES_OF_FREEDOM = 6
-# 95 % of chi-square with 6 degrees of freedom lie below this.
-CHI2_95 = 12.591587
-
-
-@dataclass(frozen=True, slots=True)
-class Consistency:
-    """Squared normalised errors of many estimates, summed up.
-
-    Attributes:
-        mean_nees: their mean over the degrees of freedom: 1 is right, more is over-confident, less over-cautious.
-        within_95: share below the 95 % bound: 0.95 is right.
-        count: how many.
-    """
-
-    mean_nees: float
-    within_95: float
-    count: int
 
 
 def nees(errors: FloatArray, covariances: FloatArray) -> FloatArray:
@@ -46,13 +27,6 @@ def nees(errors: FloatArray, covariances: FloatArray) -> FloatArray:
     if not np.isfinite(values).all():
         raise TrajectoryError("A covariance or an error is not finite.")
     return np.asarray(values)
-
-
-def consistency(values: FloatArray) -> Consistency | None:
-    """Sum up the results (M,) of ``nees``; None for no values."""
-    if not len(values):
-        return None
-    return Consistency(float(values.mean() / DEGREES_OF_FREEDOM), float(np.mean(values <= CHI2_95)), len(values))
 
 
 def _log(T: FloatArray) -> FloatArray:

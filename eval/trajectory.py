@@ -163,6 +163,11 @@ def position_errors(
     return pairs.timestamps, _position_errors(pairs, fit_alignment(pairs))
 
 
+def rmse_after_alignment(pairs: Pairs) -> float:
+    """Absolute trajectory error: root mean square position error in metres after SE(3) alignment."""
+    return _rms(_position_errors(pairs, fit_alignment(pairs)))
+
+
 def relative_errors(pairs: Pairs, interval: float = RPE_INTERVAL) -> FloatArray:
     """Errors (M, 4, 4) of the motion over ``interval`` seconds, for all poses that have a partner that much later.
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from semslam.config import LoopConfig
 from semslam.geometry.se3 import invert, transform_points
-from semslam.types import FloatArray, Keyframe, LoopCandidate, LoopConstraint, LoopEvidence, LoopOutcome
+from semslam.types import FloatArray, Keyframe, LoopCandidate, LoopConstraint, LoopEvidence, Verification
 
 GAP_SHARE = 0.5
 """Share of ``loops.min_gap`` that must lie between followed frames: what the loops before say bears them out."""
@@ -51,7 +51,7 @@ class LoopFollower:
             self._frames.append(self._frames[-1])
         self._tried, self._verified, self._waiting = set(), 0, None
 
-    def note(self, outcome: LoopOutcome) -> None:
+    def note(self, outcome: Verification) -> None:
         """Take into account what became of a candidate of the newest keyframe, whoever proposed it."""
         match = outcome.candidate.match
         self._tried.add(match)

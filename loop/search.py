@@ -10,7 +10,7 @@ from semslam.loop.segmentation.segmenter import Segmenter
 from semslam.loop.verification.verifier import LoopVerifier, build_verifier
 from semslam.plugins import load
 from semslam.runtime.stopwatch import Stopwatch
-from semslam.types import Frame, Keyframe, KeyframeView, LabelMap, LoopCandidate, LoopOutcome
+from semslam.types import Frame, Keyframe, KeyframeView, LabelMap, LoopCandidate, Verification
 
 
 class LoopSearch:
@@ -63,7 +63,7 @@ class LoopSearch:
         """All keyframes so far; ``keyframes[i].id`` is i."""
         return tuple(self._keyframes)
 
-    def search(self, keyframe: Keyframe, frame: Frame, labels: LabelMap | None = None) -> list[LoopOutcome]:
+    def search(self, keyframe: Keyframe, frame: Frame, labels: LabelMap | None = None) -> list[Verification]:
         """Take a new keyframe and look for its loops.
 
         Args:
@@ -88,7 +88,7 @@ class LoopSearch:
             outcomes.append(self._verify(further))
         return outcomes
 
-    def _verify(self, candidate: LoopCandidate) -> LoopOutcome:
+    def _verify(self, candidate: LoopCandidate) -> Verification:
         with self._stopwatch.stage("verify"):
             outcome = self._verifier.verify(self._keyframes[-1], self._keyframes[candidate.match], candidate)
         self._follower.note(outcome)

@@ -1,12 +1,10 @@
 """Dense RGB-D odometry, frame to frame: colour and depth of all pixels (Open3D's hybrid method)."""
 
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any, Self
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
 from semslam.config import Config, Section, setting
 from semslam.frontend.frame_to_frame.reference import ReferenceOdometry, Registration
@@ -67,7 +65,8 @@ class DenseRegistrar:
             return None
         import open3d as o3d
 
-        color, depth = _undistort(frame.color, depth, frame.intrinsics)
+        color = frame.intrinsics.undistort_image(frame.color, cv2.INTER_LINEAR)
+        depth = frame.intrinsics.undistort_image(depth, cv2.INTER_NEAREST)
         image, tensor = o3d.t.geometry.Image, o3d.core.Tensor.from_numpy
         rgbd = o3d.t.geometry.RGBDImage(image(tensor(color.astype(np.float32) / 255.0)), image(tensor(depth)))
         return DenseView(rgbd, frame.intrinsics)
@@ -118,22 +117,3 @@ class DenseOdometry(ReferenceOdometry[DenseView]):
     def from_config(cls, config: Config) -> Self:
         """Build it from the settings."""
         return cls(DenseRegistrar(config.section(cls.name, DenseConfig)))
-
-
-def _undistort(
-    color: npt.NDArray[np.uint8], depth: npt.NDArray[np.float32], camera: Intrinsics
-) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
-    if not camera.is_distorted:
-        return color, depth
-    u, v = _undistortion_maps(camera)
-    # Depth is not interpolated: between two surfaces there is nothing.
-    return cv2.remap(color, u, v, cv2.INTER_LINEAR), cv2.remap(depth, u, v, cv2.INTER_NEAREST)
-
-
-@lru_cache(maxsize=8)
-def _undistortion_maps(camera: Intrinsics) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
-    size = (camera.width, camera.height)
-    maps = cv2.initUndistortRectifyMap(
-        camera.matrix, np.array(camera.distortion), np.eye(3), camera.matrix, size, cv2.CV_32FC1
-    )
-    return np.asarray(maps[0]), np.asarray(maps[1])

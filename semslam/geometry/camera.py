@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import TypeVar
 
 import cv2
 import numpy as np
@@ -9,6 +10,8 @@ import numpy.typing as npt
 
 from semslam.errors import ConfigError
 from semslam.geometry.se3 import Float32Array, FloatArray
+
+PixelT = TypeVar("PixelT", np.uint8, np.uint16, np.float32)
 
 NO_DISTORTION = (0.0, 0.0, 0.0, 0.0, 0.0)
 
@@ -67,6 +70,17 @@ class Intrinsics:
         moved = cv2.undistortPoints(flat, self.matrix, distortion, P=self.matrix)
         return np.asarray(moved, dtype=np.float32).reshape(-1, 2)
 
+    def undistort_image(self, image: npt.NDArray[PixelT], interpolation: int) -> npt.NDArray[PixelT]:
+        """What an ideal pinhole of the same size would see instead of an image (H, W) or (H, W, C).
+
+        Args:
+            image: raw pixels of any type.
+            interpolation: OpenCV's flag; depth needs ``cv2.INTER_NEAREST``, as nothing lies between two surfaces.
+        """
+        if not self.is_distorted:
+            return image
+        return np.asarray(cv2.remap(image, *_undistortion_maps(self), interpolation), dtype=image.dtype)
+
     def rays(self) -> Float32Array:
         """Undistorted viewing direction with z = 1 of each raw pixel, (H, W, 2) float32: x and y."""
         return _rays(self)
@@ -103,3 +117,12 @@ def _rays(camera: Intrinsics) -> Float32Array:
     rays = rays.reshape(camera.height, camera.width, 2)
     rays.setflags(write=False)
     return rays
+
+
+@lru_cache(maxsize=8)
+def _undistortion_maps(camera: Intrinsics) -> tuple[Float32Array, Float32Array]:
+    size = (camera.width, camera.height)
+    maps = cv2.initUndistortRectifyMap(
+        camera.matrix, np.array(camera.distortion), np.eye(3), camera.matrix, size, cv2.CV_32FC1
+    )
+    return np.asarray(maps[0], dtype=np.float32), np.asarray(maps[1], dtype=np.float32)

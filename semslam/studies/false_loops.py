@@ -61,12 +61,12 @@ def stress_run(directory: Path, attacks: Sequence[Attack], strategies: Sequence[
 
 
 def _ate(solution: GraphSolution, saved: SavedRun) -> float | None:
-    """ATE of the keyframes of the saved run's largest map, metres."""
+    """ATE in metres of the keyframes of the solution's largest map."""
     if saved.ground_truth is None:
         return None
     stamps = saved.keyframe_stamps
-    keys = [key for key in sorted(solution.poses) if key in stamps]
-    if not keys:
+    keys = sorted(solution.components[0])
+    if not stamps.keys() >= set(keys):
         raise ResultsError(f"The graph in {saved.directory} does not go with its keyframes.")
     poses = np.stack([solution.poses[key] for key in keys])
     try:

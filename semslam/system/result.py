@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from semslam.backend.pose_graph import GraphSolution
-from semslam.types import FloatArray, Keyframe, LoopCandidate, LoopOutcome, Motion, TrackingStatus
+from semslam.types import FloatArray, Keyframe, LoopCandidate, Motion, TrackingStatus, Verification
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,7 +52,7 @@ class SlamResult:
 
     frames: tuple[FrameState, ...]
     keyframes: tuple[Keyframe, ...]
-    outcomes: tuple[LoopOutcome, ...]
+    outcomes: tuple[Verification, ...]
     solution: GraphSolution
     poses: FloatArray
     components: tuple[int, ...]

@@ -20,7 +20,7 @@ from semslam.runtime.stopwatch import Stopwatch
 from semslam.system.recovery import recover_poses
 from semslam.system.refinement import refine
 from semslam.system.result import FrameState, SlamResult
-from semslam.types import FloatArray, Frame, Keyframe, LoopConstraint, LoopOutcome, Motion, Observations
+from semslam.types import FloatArray, Frame, Keyframe, LoopConstraint, Motion, Observations, Verification
 
 
 @dataclass(slots=True)
@@ -65,7 +65,7 @@ class Slam:
         self._anchors: dict[int, _Anchor] = {}
         self._frames: list[FrameState] = []
         self._keyframes: list[Keyframe] = []
-        self._outcomes: list[LoopOutcome] = []
+        self._outcomes: list[Verification] = []
         self._observations: dict[int, Observations] = {}
         self._covisibility = Covisibility(config.backend.covisibility)
 
@@ -188,7 +188,7 @@ class Slam:
         for edge in self._covisibility.add(keyframe.id, keyframe.T_odom_cam, seen, keyframe.intrinsics):
             self._graph.add_covisible(edge)
 
-    def _close_loops(self, outcomes: list[LoopOutcome]) -> None:
+    def _close_loops(self, outcomes: list[Verification]) -> None:
         self._outcomes += outcomes
         for outcome in outcomes:
             if isinstance(outcome, LoopConstraint):

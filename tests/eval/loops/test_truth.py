@@ -8,10 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from semslam.datasets import open_dataset
-from semslam.eval.loops.truth import LoopJudgement, LoopTruth, find_loop_truth, judge_loops, make_view, overlap_between
+from semslam.eval.loops.truth import LoopTruth, find_loop_truth, judge_loops, make_view, overlap_between
 from semslam.geometry.camera import Intrinsics
 from semslam.geometry.se3 import Float32Array, FloatArray, exp_so3, invert, make_transform, rotation_angle
-from semslam.types import Cloud, Features, Keyframe, LoopCandidate, LoopConstraint, Trajectory
+from semslam.types import Cloud, Features, Keyframe, LoopCandidate, LoopConstraint, LoopJudgement, Trajectory
 
 CAMERA = Intrinsics(640, 480, 320.0, 320.0, 320.0, 240.0)
 WALL = np.full((480, 640), 2.0, dtype=np.float32)
