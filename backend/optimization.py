@@ -64,13 +64,12 @@ class GraphProblem:
         return {k: move @ poses[k] for k in component}
 
 
-def optimize_graph(problem: GraphProblem, config: BackendConfig, marginals: bool = False) -> GraphSolution:
+def optimize_graph(problem: GraphProblem, config: BackendConfig) -> GraphSolution:
     """Optimise robustly and judge each loop.
 
     Args:
         problem: the graph, with at least one keyframe.
         config: strategy and limits.
-        marginals: also work out each pose's covariance.
 
     Raises:
         GraphError: the optimiser failed.
@@ -109,7 +108,6 @@ def optimize_graph(problem: GraphProblem, config: BackendConfig, marginals: bool
         odometry_scale=odometry_factor,
         loop_scale=loop_factor,
         components=tuple(components),
-        covariances=_marginals(trusted, kept, loop_factor, result.values) if marginals else None,
         covisible=tuple(problem.covisible),
     )
 
@@ -167,13 +165,3 @@ def _judge(
         why = None if accepted else reason or RejectionReason.OUTLIER
         verdicts.append(LoopVerdict(constraint, weight, bool(accepted), residual, drift, why))
     return tuple(verdicts)
-
-
-def _marginals(
-    trusted: gtsam.NonlinearFactorGraph, kept: Sequence[Edge], factor: float, values: gtsam.Values
-) -> dict[int, FloatArray]:
-    graph = gtsam.NonlinearFactorGraph(trusted)
-    for edge in kept:
-        graph.add(between_factor(edge.widened(factor)))
-    marginals = gtsam.Marginals(graph, values)
-    return {key: np.asarray(marginals.marginalCovariance(key)) for key in values.keys()}  # noqa: SIM118

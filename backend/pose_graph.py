@@ -109,11 +109,8 @@ class PoseGraph:
         if self._loops.pop((match, query), None) is None:
             raise GraphError(f"There is no loop from {match} to {query}.")
 
-    def optimize(self, marginals: bool = False) -> GraphSolution:
+    def optimize(self) -> GraphSolution:
         """Optimise by the configured strategy.
-
-        Args:
-            marginals: also work out each pose's covariance.
 
         Raises:
             GraphError: the graph is empty or the optimiser failed.
@@ -128,7 +125,7 @@ class PoseGraph:
             constraints=tuple(self._loops.values()),
             covisible=tuple(self._covisible.values()),
         )
-        return optimize_graph(problem, self._config, marginals)
+        return optimize_graph(problem, self._config)
 
     def _require(self, key: int) -> None:
         if key not in self._poses:

@@ -76,7 +76,6 @@ class GraphSolution:
         odometry_scale: factor on odometry's standard deviations (``semslam.backend.robust.calibration``).
         loop_scale: the same of the loops'.
         components: keys that hang together by odometry and accepted loops; the largest set first.
-        covariances: (6, 6) marginals by key where they were asked for.
         covisible: edges between keyframes that see the same landmarks, which took part beside ``edges``.
     """
 
@@ -88,7 +87,6 @@ class GraphSolution:
     odometry_scale: float
     loop_scale: float
     components: tuple[tuple[int, ...], ...]
-    covariances: dict[int, FloatArray] | None = None
     covisible: tuple[Edge, ...] = ()
 
     @property
