@@ -1,5 +1,7 @@
 """Poses while the run goes on: iSAM2 beside the pose graph (Kaess et al., IJRR 2012)."""
 
+from dataclasses import dataclass
+
 import gtsam
 import numpy.typing as npt
 
@@ -11,10 +13,11 @@ from semslam.backend.graph.factors import (
     prior_factor,
     read_poses,
 )
-from semslam.backend.graph.products import GraphSolution, loop_edge
+from semslam.backend.graph.products import Edge, GraphSolution, loop_edge
 from semslam.backend.pose_graph import PoseGraph
 from semslam.config import BackendConfig
 from semslam.errors import GraphError
+from semslam.geometry.se3 import invert
 from semslam.types import FloatArray, LoopConstraint
 
 RELINEARIZE = 0.02
@@ -27,6 +30,20 @@ FIRST_RETRY, RETRY_SHARE = 5, 0.05
 """Waiting loops, and share of all loops, at which all are judged together; then again when they have doubled."""
 
 Pair = tuple[int, int]
+"""Match and query of a loop."""
+
+
+@dataclass(frozen=True, slots=True)
+class LoopChange:
+    """What an update made of loops.
+
+    Attributes:
+        accepted: loops that shape the poses now and did not before.
+        withdrawn: loops that shaped the poses before and no longer do.
+    """
+
+    accepted: tuple[Pair, ...]
+    withdrawn: tuple[Pair, ...]
 
 
 class IncrementalPoseGraph:
@@ -36,6 +53,12 @@ class IncrementalPoseGraph:
     ratio test); otherwise it waits. When enough loops wait, and whenever one joins two maps, the whole graph is
     optimised robustly and iSAM2 starts anew from there with the loops that were accepted: loops are tried again,
     and a wrong one that came first does not bar those that come later.
+
+    It is a ``KeyframeGraph``. During a run, for each keyframe: ``add_keyframe`` with odometry's pose, ``add_odometry``,
+    ``add_covisible``, ``add_loop``, then ``update``, which returns what became of loops. ``correction`` takes
+    odometry's frame to the world as the loops have it and costs next to nothing; ``pose`` and ``poses`` read the
+    current poses; ``accepted``, ``waiting`` and ``withdrawn`` list the loops. ``optimize`` gives the solution in batch
+    at the end, the same as ``PoseGraph`` gives for the same graph.
     """
 
     def __init__(self, config: BackendConfig | None = None) -> None:
@@ -52,6 +75,12 @@ class IncrementalPoseGraph:
         self._odometry_scale = self._loop_scale = 1.0
         self._retry_at = FIRST_RETRY
         self._known_error: float | None = None  # new keyframes start on their odometry and add nothing to it
+        self._withdrawn: dict[Pair, None] = {}
+
+    @property
+    def loops(self) -> tuple[LoopConstraint, ...]:
+        """See ``KeyframeGraph.loops``."""
+        return self._graph.loops
 
     @property
     def accepted(self) -> tuple[Pair, ...]:
@@ -63,27 +92,43 @@ class IncrementalPoseGraph:
         """Match and query of the loops that the poses contradict; they will be tried again."""
         return tuple(self._waiting)
 
+    @property
+    def withdrawn(self) -> tuple[Pair, ...]:
+        """Match and query of the waiting loops that once shaped the poses."""
+        return tuple(self._withdrawn)
+
+    def start(self, key: int) -> FloatArray:
+        """See ``KeyframeGraph.start``."""
+        return self._graph.start(key)
+
     def add_keyframe(self, key: int, T_world_cam: npt.ArrayLike) -> None:
-        """See ``PoseGraph.add_keyframe``."""
+        """See ``KeyframeGraph.add_keyframe``."""
         self._graph.add_keyframe(key, T_world_cam)
         self._map_of[key] = key
         self._new.append(key)
 
     def add_prior(self, key: int, T_world_cam: npt.ArrayLike) -> None:
-        """See ``PoseGraph.add_prior``; only a map's first keyframe can be anchored, before the next ``update``."""
+        """See ``KeyframeGraph.add_prior``; only a map's first keyframe can be anchored, before the next ``update``."""
         self._graph.add_prior(key, T_world_cam)
         self._stage_prior(key, self._graph.start(key))
 
-    def add_odometry(self, from_key: int, to_key: int, T_from_to: npt.ArrayLike, covariance: npt.ArrayLike) -> None:
-        """See ``PoseGraph.add_odometry``; a new keyframe starts where odometry takes it from the current pose."""
+    def add_odometry(self, from_key: int, to_key: int, T_from_to: npt.ArrayLike, covariance: npt.ArrayLike) -> Edge:
+        """See ``KeyframeGraph.add_odometry``; a new keyframe starts where odometry takes it from the current pose."""
         edge = self._graph.add_odometry(from_key, to_key, T_from_to, covariance)
         self._factors.add(between_factor(edge.widened(self._odometry_scale)))
         if self._knows(from_key) and not self._knows(to_key):
             self._values.insert(to_key, self._current(from_key).compose(gtsam.Pose3(edge.T_from_to)))
         self._join(from_key, to_key)
+        return edge
+
+    def add_covisible(self, edge: Edge) -> Edge:
+        """See ``KeyframeGraph.add_covisible``."""
+        edge = self._graph.add_covisible(edge)
+        self._factors.add(between_factor(edge))
+        return edge
 
     def add_loop(self, constraint: LoopConstraint) -> None:
-        """See ``PoseGraph.add_loop``."""
+        """See ``KeyframeGraph.add_loop``."""
         self._graph.add_loop(constraint)
         self._fresh.append(constraint)
 
@@ -100,16 +145,24 @@ class IncrementalPoseGraph:
         if slot is not None:
             self._withdraw(slot)
 
-    def update(self) -> None:
+    def update(self) -> LoopChange:
         """Take in what was added since the last time.
+
+        Returns:
+            The loops that shape the poses since this update, and those that no longer do.
 
         Raises:
             GraphError: the graph could not be solved.
         """
+        before = dict.fromkeys(self._slots)
         try:
             self._take_in()
         except RuntimeError as error:  # GTSAM's own, such as an indeterminate system
             raise GraphError(f"The pose graph could not be updated: {' '.join(str(error).split())}") from error
+        gone = tuple(pair for pair in before if pair not in self._slots)
+        self._withdrawn.update(dict.fromkeys(gone))
+        self._withdrawn = {pair: None for pair in self._withdrawn if pair in self._waiting}
+        return LoopChange(tuple(pair for pair in self._slots if pair not in before), gone)
 
     def optimize(self) -> GraphSolution:
         """Optimise the whole graph robustly, and go on from there with the loops that were accepted.
@@ -127,6 +180,14 @@ class IncrementalPoseGraph:
         """The current pose T_world_cam (4, 4) of one keyframe, which an ``update`` has taken in."""
         T_world_cam: FloatArray = self._isam.calculateEstimatePose3(key).matrix()
         return T_world_cam
+
+    def correction(self, key: int) -> FloatArray:
+        """T_world_odom (4, 4): takes the frame in which a keyframe was added to that of its current pose.
+
+        With the newest keyframe's it corrects the poses that odometry has found since; other maps of the odometry have
+        corrections of their own.
+        """
+        return self.pose(key) @ invert(self._graph.start(key))
 
     def poses(self) -> dict[int, FloatArray]:
         """All current poses by key; takes time in proportion to their number."""
@@ -187,7 +248,7 @@ class IncrementalPoseGraph:
             sigma = ANCHOR_SIGMA if key == solution.anchors[0] else FLOATING_SIGMA
             graph.add(prior_factor(key, solution.poses[key], sigma))
             self._map_of.update(dict.fromkeys(component, component[0]))
-        for edge in solution.widened:
+        for edge in (*solution.covisible, *solution.widened):
             graph.add(between_factor(edge))
         self._isam, self._known_error = _new_isam(), None
         slots = self._isam.update(graph, make_values(solution.poses)).getNewFactorsIndices()

@@ -73,7 +73,7 @@ class PoseGraph:
         self._odometry[from_key, to_key] = edge
         return edge
 
-    def add_covisible(self, edge: Edge) -> None:
+    def add_covisible(self, edge: Edge) -> Edge:
         """Join two keyframes that see the same landmarks; trusted as odometry is, but no part of its chain.
 
         Raises:
@@ -86,6 +86,7 @@ class PoseGraph:
             raise GraphError(f"{what} is in the graph already.")
         T, covariance = checked_pose(edge.T_from_to, what), checked_covariance(edge.covariance, what)
         self._covisible[pair] = Edge(*pair, T, covariance)
+        return self._covisible[pair]
 
     def add_loop(self, constraint: LoopConstraint) -> None:
         """Add a loop closure, which may be false.

@@ -11,7 +11,7 @@ from semslam.backend.analysis.simulation import measure, measure_odometry, ring
 from semslam.backend.analysis.stress import FalseLoopKind, false_loops
 from semslam.backend.graph.g2o import read_g2o
 from semslam.backend.graph.products import PosedGraph
-from semslam.backend.incremental import IncrementalPoseGraph
+from semslam.backend.incremental import IncrementalPoseGraph, LoopChange
 from semslam.backend.pose_graph import PoseGraph
 from semslam.config import BackendConfig
 from semslam.errors import GraphError
@@ -77,6 +77,30 @@ def test_a_loop_shows_at_once():
     replay(odometry, loops[:1], after_each=note)
     first = loops[0].to_key
     assert errors[first] < 0.5 * errors[first - 1]
+
+
+def test_the_newest_keyframe_corrects_odometry():
+    _, odometry, loops = simulated(seed=1)
+    graph = replay(odometry, loops)
+    newest = odometry[-1].to_key
+    step = measure(ring(80), [(0, 1)], np.random.default_rng(0))[0]
+    graph.add_keyframe(newest + 1, graph.start(newest) @ step.T_from_to)
+    graph.add_odometry(newest, newest + 1, step.T_from_to, step.covariance)
+    before = graph.correction(newest)
+    graph.update()
+    np.testing.assert_allclose(before @ graph.start(newest + 1), graph.pose(newest + 1), atol=1e-9)
+    assert np.linalg.norm(before[:3, 3]) > 0.01
+
+
+def test_updates_tell_what_became_of_loops():
+    _, odometry, loops = simulated(seed=2)
+    graph = replay(odometry, loops[:-1])
+    last = loops[-1].from_key, loops[-1].to_key
+    graph.add_loop(constraint_of(loops[-1]))
+    change = graph.update()
+    assert (change.accepted, change.withdrawn) == ((last,), ())
+    assert graph.update() == LoopChange((), ())
+    assert not graph.withdrawn
 
 
 def test_one_outlier_can_be_removed():
