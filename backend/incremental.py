@@ -7,7 +7,6 @@ import numpy.typing as npt
 
 from semslam.backend.graph.factors import (
     ANCHOR_SIGMA,
-    FLOATING_SIGMA,
     between_factor,
     make_values,
     prior_factor,
@@ -245,8 +244,7 @@ class IncrementalPoseGraph:
         graph = gtsam.NonlinearFactorGraph()
         for component in solution.components:
             key = next(anchor for anchor in solution.anchors if anchor in component)
-            sigma = ANCHOR_SIGMA if key == solution.anchors[0] else FLOATING_SIGMA
-            graph.add(prior_factor(key, solution.poses[key], sigma))
+            graph.add(prior_factor(key, solution.poses[key], ANCHOR_SIGMA))
             self._map_of.update(dict.fromkeys(component, component[0]))
         for edge in (*solution.covisible, *solution.widened):
             graph.add(between_factor(edge))
@@ -258,8 +256,9 @@ class IncrementalPoseGraph:
         self._factors, self._values = gtsam.NonlinearFactorGraph(), gtsam.Values()
 
     def _stage_prior(self, key: int, T_world_cam: FloatArray) -> None:
-        is_first = key == next(iter(self._map_of))
-        self._factors.add(prior_factor(key, T_world_cam, ANCHOR_SIGMA if is_first else FLOATING_SIGMA))
+        # Maps are held apart until a loop joins them, which starts the graph anew: a loose prior would only make the
+        # system badly conditioned.
+        self._factors.add(prior_factor(key, T_world_cam, ANCHOR_SIGMA))
         self._values.insert(key, gtsam.Pose3(T_world_cam))
 
     def _knows(self, key: int) -> bool:

@@ -3,7 +3,7 @@
 from typing import Self
 
 from semslam.config import Config, LoopConfig
-from semslam.loop.detector import LoopDetector, NoLoops
+from semslam.loop.detector import LoopDetector
 from semslam.loop.following import LoopFollower
 from semslam.loop.segmentation.build import build_segmenter
 from semslam.loop.segmentation.segmenter import Segmenter
@@ -93,17 +93,3 @@ class LoopSearch:
             outcome = self._verifier.verify(self._keyframes[-1], self._keyframes[candidate.match], candidate)
         self._follower.note(outcome)
         return outcome
-
-
-def build_search(
-    config: Config, stopwatch: Stopwatch | None = None, verifier: LoopVerifier | None = None
-) -> LoopSearch | None:
-    """The search that the settings ask for, or None where the detector is "none".
-
-    Raises:
-        ConfigError: a name is unknown.
-        ModelError: the network's weights are missing or damaged.
-    """
-    if config.detector == NoLoops.name:
-        return None
-    return LoopSearch.from_config(config, stopwatch, verifier=verifier)

@@ -1,5 +1,7 @@
 """Settings that hold for every loop detector."""
 
+from typing import Literal
+
 from semslam.config.section import Section, setting
 
 
@@ -10,5 +12,9 @@ class LoopConfig(Section):
     max_candidates: int = setting(5, "maximum number of candidates that a detector proposes for a keyframe", gt=0)
     follow: int = setting(
         3, "maximum number of candidates predicted from the last verified loop and odometry; 0 = none", ge=0
+    )
+    delay: int = setting(1, "number of keyframes after which a loop moves the live poses", ge=0)
+    worker: Literal["auto", "process", "thread", "none"] = setting(
+        "auto", "where loops are closed, beside tracking or not; auto = a process where a sequence is long"
     )
     min_score: float | None = setting(None, "score threshold of a candidate; none = the detector's own", ge=0, le=1)

@@ -63,6 +63,7 @@ class Metrics(_Record):
         keyframes: keyframes of all maps.
         ground_truth_coverage: share of frames that have ground truth, or None.
         odometry_only: the front end's causal trajectory.
+        live: the trajectory as it stood when each frame was done, with the loops known by then.
         optimized: the final trajectory.
         maps: maps left at the end.
         loops: what became of the candidates.
@@ -81,6 +82,7 @@ class Metrics(_Record):
     keyframes: int
     ground_truth_coverage: float | None
     odometry_only: TrajectoryMetrics
+    live: TrajectoryMetrics = TrajectoryMetrics()
     optimized: TrajectoryMetrics
     maps: int
     loops: LoopMetrics

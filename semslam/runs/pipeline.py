@@ -3,6 +3,7 @@
 import resource
 import time
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
 
@@ -15,11 +16,15 @@ from semslam.runs.metrics import Metrics, TimeMetrics
 from semslam.runs.recording import RecordedFrame, Recording, checksum
 from semslam.runs.scoring import score_run
 from semslam.runtime.stopwatch import Stopwatch
+from semslam.runtime.workers import WorkerKind
 from semslam.system.result import FrameState, SlamResult
 from semslam.system.slam import Slam
 from semslam.types import LedgerEntry, Trajectory
 
 Progress = Callable[[int, FrameState | None], None]
+
+LONG_SEQUENCE = 300
+"""Frames from which on a process of its own for loops is worth its start."""
 
 
 def _silent(index: int, state: FrameState | None) -> None:
@@ -34,6 +39,7 @@ class RunResult:
         config: the effective settings.
         slam: frames, keyframes, loops and graph.
         odometry: the front end's causal trajectory: tracked frames of its largest map.
+        live: the same frames as they stood when each was done, with the loops known by then.
         trajectory: the final trajectory: tracked frames of the largest map.
         ground_truth: the dataset's, or None.
         ledger: one entry per loop candidate.
@@ -45,6 +51,7 @@ class RunResult:
     config: Config
     slam: SlamResult
     odometry: Trajectory
+    live: Trajectory
     trajectory: Trajectory
     ground_truth: Trajectory | None
     ledger: tuple[LedgerEntry, ...]
@@ -69,9 +76,9 @@ def run(dataset: Dataset, config: Config | None = None, progress: Progress = _si
         ModelError: the network's weights are missing or damaged.
         DatasetError: no frame at all could be read or tracked.
     """
-    session = _Session(dataset, config or Config())
-    session.drive(session.track(), progress)
-    return session.result()
+    with closing(_Session(dataset, config or Config())) as session:
+        session.drive(session.track(), progress)
+        return session.result()
 
 
 def replay(
@@ -98,9 +105,9 @@ def replay(
         DatasetError: it is another sequence, or a keyframe's image cannot be read.
     """
     recording.check(dataset)
-    session = _Session(dataset, config, verifier)
-    session.drive(session.repeat(recording), progress)
-    return session.result()
+    with closing(_Session(dataset, config, verifier)) as session:
+        session.drive(session.repeat(recording), progress)
+        return session.result()
 
 
 class _Session:
@@ -109,7 +116,7 @@ class _Session:
     def __init__(self, dataset: Dataset, config: Config, verifier: LoopVerifier | None = None) -> None:
         self._dataset, self._config = dataset, config
         self._stopwatch, self._clock = Stopwatch(), _Clock()
-        self._slam = Slam.from_config(config, self._stopwatch, verifier)
+        self._slam = Slam.from_config(config, self._stopwatch, verifier, _worker(config, len(dataset)))
         self._unreadable: list[str] = []
         self._checksum = 0
         self._interrupted = False
@@ -132,6 +139,10 @@ class _Session:
             read = partial(self._dataset.frame, frame.index)
             yield frame.index, self._slam.advance(frame.index, frame.timestamp, frame.motion, read)
 
+    def close(self) -> None:
+        """End what runs beside tracking."""
+        self._slam.close()
+
     def drive(self, states: Iterable[tuple[int, FrameState | None]], progress: Progress) -> None:
         """Take frame after frame until the last, or until Ctrl-C."""
         try:
@@ -151,6 +162,7 @@ class _Session:
             config=self._config,
             slam=slam,
             odometry=scores.odometry,
+            live=scores.live,
             trajectory=scores.trajectory,
             ground_truth=self._dataset.ground_truth,
             ledger=scores.ledger,
@@ -163,6 +175,13 @@ class _Session:
             ),
             notes=(*self._dataset.notes, *self._unreadable, *slam.notes),
         )
+
+
+def _worker(config: Config, frames: int) -> WorkerKind:
+    """Where loops are closed; a process takes seconds to start, which a short sequence does not win back."""
+    if config.loops.worker == "auto":
+        return WorkerKind.PROCESS if frames >= LONG_SEQUENCE else WorkerKind.NONE
+    return WorkerKind(config.loops.worker)
 
 
 class _Clock:

@@ -85,6 +85,7 @@ def write_run(
         (work / "metrics.json").write_text(result.metrics.model_dump_json(indent=2) + "\n", encoding="utf-8")
         (work / "log.txt").write_text("".join(f"{note}\n" for note in result.notes), encoding="utf-8")
         write_trajectory(work / "odometry.txt", result.odometry)
+        write_trajectory(work / "live.txt", result.live)
         write_trajectory(work / "trajectory.txt", result.trajectory)
         write_trajectory(work / "keyframes.txt", _keyframe_trajectory(result))
         (work / "keyframes.csv").write_text(_keyframe_table(result.slam.keyframes), encoding="utf-8")

@@ -32,12 +32,14 @@ class Scores:
 
     Attributes:
         odometry: causal trajectory, tracked frames of the odometry's largest map.
+        live: the same frames' poses as they stood when each was done, with the loops known by then.
         trajectory: final trajectory, tracked frames of the largest map.
         ledger: one entry per candidate.
         metrics: all figures.
     """
 
     odometry: Trajectory
+    live: Trajectory
     trajectory: Trajectory
     ledger: tuple[LedgerEntry, ...]
     metrics: Metrics
@@ -48,7 +50,7 @@ def score_run(
 ) -> Scores:
     """Score a run; without ground truth, or where it meets fewer than three poses, the errors are None."""
     truth = dataset.ground_truth
-    odometry, trajectory = _trajectories(slam)
+    odometry, live, trajectory = _trajectories(slam)
     ledger = _ledger(dataset, slam, config)
     stamps = [state.timestamp for state in slam.frames]
     metrics = Metrics(
@@ -63,13 +65,14 @@ def score_run(
         keyframes=len(slam.keyframes),
         ground_truth_coverage=None if truth is None else coverage(stamps, truth),
         odometry_only=TrajectoryMetrics.from_score(_score(odometry, truth)),
+        live=TrajectoryMetrics.from_score(_score(live, truth)),
         optimized=TrajectoryMetrics.from_score(_score(trajectory, truth)),
         maps=len(slam.solution.components),
         loops=_loop_metrics(slam, ledger, truth is not None),
         time=time,
         interrupted=interrupted,
     )
-    return Scores(odometry, trajectory, ledger, metrics)
+    return Scores(odometry, live, trajectory, ledger, metrics)
 
 
 def lost_intervals(frames: Sequence[FrameState]) -> list[tuple[float, float]]:
@@ -86,16 +89,19 @@ def lost_intervals(frames: Sequence[FrameState]) -> list[tuple[float, float]]:
     return intervals
 
 
-def _trajectories(slam: SlamResult) -> tuple[Trajectory, Trajectory]:
+def _trajectories(slam: SlamResult) -> tuple[Trajectory, Trajectory, Trajectory]:
+    """Causal, live and final."""
     tracked = np.array([state.status is not TrackingStatus.LOST for state in slam.frames])
     stamps = np.array([state.timestamp for state in slam.frames])
     map_ids = np.array([state.map_id for state in slam.frames])
     largest_map = np.bincount(map_ids[tracked]).argmax()
     causal = np.array([state.T_odom_cam for state in slam.frames])
+    live = np.array([state.T_world_cam for state in slam.frames])
     in_odometry = tracked & (map_ids == largest_map)
     in_final = tracked & (np.array(slam.components) == 0)
     return (
         Trajectory(stamps[in_odometry], causal[in_odometry]),
+        Trajectory(stamps[in_odometry], live[in_odometry]),
         Trajectory(stamps[in_final], slam.poses[in_final]),
     )
 

@@ -2,14 +2,14 @@
 
 import time
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 
 import numpy as np
 
 
 class Stopwatch:
-    """Collects wall times by stage name; its figures are reported and never decide anything."""
+    """Collects wall times by stage name; its values are reported and never decide anything."""
 
     def __init__(self) -> None:
         self._seconds: defaultdict[str, list[float]] = defaultdict(list)
@@ -22,6 +22,16 @@ class Stopwatch:
             yield
         finally:
             self._seconds[name].append(time.perf_counter() - start)
+
+    def take(self) -> dict[str, list[float]]:
+        """Hand out the times so far, by stage, and start anew."""
+        seconds, self._seconds = dict(self._seconds), defaultdict(list)
+        return seconds
+
+    def add(self, seconds: Mapping[str, Sequence[float]]) -> None:
+        """Take in times that another stopwatch has handed out."""
+        for name, times in seconds.items():
+            self._seconds[name].extend(times)
 
     def medians_ms(self) -> dict[str, float]:
         """Median milliseconds of a call, by stage."""

@@ -14,7 +14,8 @@ class FrameState:
         index: its place in the sequence.
         timestamp: seconds.
         motion: the odometry's; observations are kept of keyframes only.
-        T_odom_cam: (4, 4) causal odometry pose.
+        T_odom_cam: (4, 4) pose by causal odometry.
+        T_world_cam: (4, 4) live pose: by odometry and the loops that were in the live graph by then.
         keyframe: id of the keyframe made of it, if any.
     """
 
@@ -22,6 +23,7 @@ class FrameState:
     timestamp: float
     motion: Motion
     T_odom_cam: FloatArray
+    T_world_cam: FloatArray
     keyframe: int | None
 
     @property
@@ -47,6 +49,7 @@ class SlamResult:
         solution: optimised keyframe poses and a verdict for each verified loop.
         poses: (N, 4, 4) optimised T_world_cam of every frame.
         components: for each frame the map it ends in, 0 the largest; maps that a loop joined share a number.
+        live_loops: match and query of the loops that the live graph follows at the end.
         notes: what could not be done, a sentence each.
     """
 
@@ -56,6 +59,7 @@ class SlamResult:
     solution: GraphSolution
     poses: FloatArray
     components: tuple[int, ...]
+    live_loops: frozenset[tuple[int, int]] = frozenset()
     notes: tuple[str, ...] = ()
 
     @property

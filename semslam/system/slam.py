@@ -1,22 +1,26 @@
 """The algorithm: a frame in, a state out. It reads no files, writes none and prints nothing."""
 
+from collections import deque
 from collections.abc import Callable
+from concurrent.futures import Future
 from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
 
 from semslam.backend.bundle.covisibility import Covisibility
-from semslam.backend.pose_graph import GraphSolution, PoseGraph
+from semslam.backend.graph.products import Edge, GraphSolution
+from semslam.backend.pose_graph import PoseGraph
 from semslam.config import Config
 from semslam.errors import GraphError
 from semslam.frontend.keyframes import KeyframeBuilder
 from semslam.frontend.odometry import Odometry
-from semslam.geometry.se3 import adjoint, invert
-from semslam.loop.search import LoopSearch, build_search
+from semslam.geometry.se3 import adjoint, invert, orthonormalise
 from semslam.loop.verification.verifier import LoopVerifier
 from semslam.plugins import load
 from semslam.runtime.stopwatch import Stopwatch
+from semslam.runtime.workers import Worker, WorkerKind
+from semslam.system.closing import KeyframeAnswer, KeyframeJob, build_closing
 from semslam.system.recovery import recover_poses
 from semslam.system.refinement import refine
 from semslam.system.result import FrameState, SlamResult
@@ -36,13 +40,17 @@ class _Anchor:
 
 
 class Slam:
-    """RGB-D SLAM: odometry, keyframes, loop search, pose graph.
+    """RGB-D SLAM: odometry, keyframes, loop closing, pose graph.
+
+    Tracking never reads what loops say, so that the result is the same wherever loop closing runs. Its answer for a
+    keyframe moves the live poses from the frame at which ``loops.delay`` further keyframes have been made, never
+    sooner and never later.
 
     Args:
         odometry: tracks frames.
         builder: makes keyframes of them.
-        search: finds loops between keyframes; None = odometry alone.
-        graph: joins motions and loops.
+        closing: finds loops between keyframes and keeps the live graph; None = odometry alone. It is closed with this.
+        graph: joins motions and loops for the final solution.
         config: settings of the back end.
         stopwatch: collects stage times.
     """
@@ -51,14 +59,14 @@ class Slam:
         self,
         odometry: Odometry,
         builder: KeyframeBuilder,
-        search: LoopSearch | None,
+        closing: Worker[KeyframeJob, KeyframeAnswer] | None,
         graph: PoseGraph,
         config: Config,
         stopwatch: Stopwatch,
     ) -> None:
         self._odometry = odometry
         self._builder = builder
-        self._search = search
+        self._closing = closing
         self._graph = graph
         self._config = config
         self._stopwatch = stopwatch
@@ -66,28 +74,40 @@ class Slam:
         self._frames: list[FrameState] = []
         self._keyframes: list[Keyframe] = []
         self._outcomes: list[Verification] = []
+        self._pending: deque[Future[KeyframeAnswer]] = deque()
+        self._T_world_odom: dict[int, FloatArray] = {}
+        self._live_loops: dict[tuple[int, int], None] = {}
         self._observations: dict[int, Observations] = {}
         self._covisibility = Covisibility(config.backend.covisibility)
 
     @classmethod
     def from_config(
-        cls, config: Config, stopwatch: Stopwatch | None = None, verifier: LoopVerifier | None = None
+        cls,
+        config: Config,
+        stopwatch: Stopwatch | None = None,
+        verifier: LoopVerifier | None = None,
+        worker: WorkerKind = WorkerKind.NONE,
     ) -> Self:
-        """Build every part by its registered name; a verifier of one's own takes the place of the registered one.
+        """Build every part by its registered name.
+
+        Args:
+            config: the settings.
+            stopwatch: collects stage times.
+            verifier: decides on candidates; None = the registered one.
+            worker: where loops are closed; in a thread or process of its own tracking does not wait for them.
 
         Raises:
             ConfigError: a name is unknown.
             ModelError: the network's weights are missing or damaged.
         """
-        stopwatch = stopwatch or Stopwatch()
-        search = build_search(config, stopwatch, verifier)
+        closing = build_closing(config, worker, verifier)
         return cls(
             odometry=load("semslam.odometry", config.odometry).from_config(config),
-            builder=KeyframeBuilder(config, details=search is not None),
-            search=search,
+            builder=KeyframeBuilder(config, details=closing is not None),
+            closing=closing,
             graph=PoseGraph(config.backend),
             config=config,
-            stopwatch=stopwatch,
+            stopwatch=stopwatch or Stopwatch(),
         )
 
     @property
@@ -126,6 +146,7 @@ class Slam:
             timestamp=timestamp,
             motion=motion if keyframe is not None else replace(motion, observations=None),
             T_odom_cam=self._builder.pose.T_odom_cam,
+            T_world_cam=self._live_pose(),
             keyframe=None if keyframe is None else keyframe.id,
         )
         self._frames.append(state)
@@ -137,6 +158,7 @@ class Slam:
         Raises:
             GraphError: nothing was tracked yet, or the optimiser failed.
         """
+        self._collect(leave=0)
         with self._stopwatch.stage("optimize"):
             solution = self._graph.optimize()
         notes = []
@@ -160,39 +182,63 @@ class Slam:
                 solution.poses,
             ),
             components=tuple(components.get(state.map_id, unplaced) for state in self._frames),
+            live_loops=frozenset(self._live_loops),
             notes=tuple(notes),
         )
+
+    def close(self) -> None:
+        """End what runs beside tracking; the keyframes so far are still finished."""
+        if self._closing is not None:
+            self._closing.close()
 
     def _add_keyframe(self, frame: Frame, motion: Motion) -> Keyframe:
         with self._stopwatch.stage("keyframe"):
             keyframe = self._builder.build(frame)
         self._keyframes.append(keyframe)
-        self._connect(keyframe)
-        if motion.observations is not None:
-            self._observe(keyframe, motion.observations)
-        if self._search is not None:
-            self._close_loops(self._search.search(keyframe, frame))
+        odometry = self._connect(keyframe)
+        covisible = self._observe(keyframe, motion.observations)
+        if self._closing is not None:
+            self._pending.append(self._closing.submit(KeyframeJob(keyframe, frame, odometry, covisible)))
+            self._collect(leave=self._config.loops.delay)
         return keyframe
 
-    def _connect(self, keyframe: Keyframe) -> None:
+    def _connect(self, keyframe: Keyframe) -> Edge | None:
+        """Join a keyframe to the one before in its map."""
         self._graph.add_keyframe(keyframe.id, keyframe.T_odom_cam)
         last = self._anchors.get(keyframe.map_id)
-        if last is not None:
-            T_last_this = invert(last.keyframe.T_odom_cam) @ keyframe.T_odom_cam
-            self._graph.add_odometry(last.keyframe.id, keyframe.id, T_last_this, last.covariance)
         self._anchors[keyframe.map_id] = _Anchor(keyframe, np.zeros((6, 6)))
+        if last is None:
+            return None
+        T_last_this = invert(last.keyframe.T_odom_cam) @ keyframe.T_odom_cam
+        return self._graph.add_odometry(last.keyframe.id, keyframe.id, T_last_this, last.covariance)
 
-    def _observe(self, keyframe: Keyframe, seen: Observations) -> None:
-        """Keep the landmarks that a keyframe sees, and connect it to others that see them."""
+    def _observe(self, keyframe: Keyframe, seen: Observations | None) -> tuple[Edge, ...]:
+        """Keep the landmarks that a keyframe sees, and join it to others that see them."""
+        if seen is None:
+            return ()
         self._observations[keyframe.id] = seen
-        for edge in self._covisibility.add(keyframe.id, keyframe.T_odom_cam, seen, keyframe.intrinsics):
-            self._graph.add_covisible(edge)
+        edges = self._covisibility.add(keyframe.id, keyframe.T_odom_cam, seen, keyframe.intrinsics)
+        return tuple(self._graph.add_covisible(edge) for edge in edges)
 
-    def _close_loops(self, outcomes: list[Verification]) -> None:
-        self._outcomes += outcomes
-        for outcome in outcomes:
-            if isinstance(outcome, LoopConstraint):
-                self._graph.add_loop(outcome)
+    def _collect(self, leave: int) -> None:
+        """Take in the answers for all keyframes but the last ``leave``, waiting for them where they are not there."""
+        while len(self._pending) > leave:
+            answer = self._pending.popleft().result()
+            self._stopwatch.add(answer.seconds)
+            self._outcomes += answer.verifications
+            for verification in answer.verifications:
+                if isinstance(verification, LoopConstraint):
+                    self._graph.add_loop(verification)
+            self._T_world_odom[self._keyframes[answer.keyframe].map_id] = answer.T_world_odom
+            self._live_loops.update(dict.fromkeys(answer.accepted))
+            for pair in answer.withdrawn:
+                del self._live_loops[pair]
+
+    def _live_pose(self) -> FloatArray:
+        """T_world_cam (4, 4) of the newest frame by the loops that are in the live graph."""
+        pose = self._builder.pose
+        T_world_odom = self._T_world_odom.get(pose.map_id)
+        return pose.T_odom_cam if T_world_odom is None else orthonormalise(T_world_odom @ pose.T_odom_cam)
 
     def _components(self, solution: GraphSolution) -> dict[int, int]:
         """For each map of the odometry the place of its component in ``solution.components``, the largest first."""

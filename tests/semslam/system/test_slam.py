@@ -6,6 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from semslam.backend.incremental import IncrementalPoseGraph
 from semslam.backend.pose_graph import GraphSolution, PoseGraph
 from semslam.config import Config, LoopConfig
 from semslam.errors import GraphError
@@ -14,6 +15,8 @@ from semslam.geometry.camera import Intrinsics
 from semslam.geometry.se3 import FloatArray, exp_so3, invert, make_transform
 from semslam.loop.search import LoopSearch
 from semslam.runtime.stopwatch import Stopwatch
+from semslam.runtime.workers import InlineWorker
+from semslam.system.closing import KeyframeAnswer, KeyframeJob, LoopClosing
 from semslam.system.recovery import recover_poses
 from semslam.system.result import SlamResult
 from semslam.system.slam import Slam
@@ -89,13 +92,19 @@ def frame(index: int) -> Frame:
     return Frame(index, DT * index, np.zeros((*shape, 3), np.uint8), np.ones(shape, np.float32), CAMERA)
 
 
+def closing(detector: LastSeesFirst, verifier: TruthfulVerifier) -> InlineWorker[KeyframeJob, KeyframeAnswer]:
+    stopwatch = Stopwatch()
+    search = LoopSearch(detector, None, verifier, LoopConfig(), stopwatch)  # type: ignore[arg-type]
+    return InlineWorker(lambda: LoopClosing(search, IncrementalPoseGraph(), stopwatch).close)
+
+
 def run_ring(**script: object) -> tuple[FloatArray, SlamResult]:
     truth = ring(FRAMES)
     refuse = bool(script.pop("refuse", False))
     slam = Slam(
         ScriptedOdometry(truth, **script),  # type: ignore[arg-type]
         KeyframeBuilder(Config()),
-        LoopSearch(LastSeesFirst(after=15), None, TruthfulVerifier(truth, refuse), LoopConfig()),
+        closing(LastSeesFirst(after=15), TruthfulVerifier(truth, refuse)),
         PoseGraph(Config().backend),
         Config(),
         Stopwatch(),
@@ -146,8 +155,8 @@ def test_two_maps_are_joined_by_a_loop_alone() -> None:
 
 
 def test_finishing_before_a_frame_is_an_error_and_not_a_result() -> None:
-    search = LoopSearch(LastSeesFirst(0), None, TruthfulVerifier(ring(3)), LoopConfig())
-    slam = Slam(ScriptedOdometry(ring(3)), KeyframeBuilder(Config()), search, PoseGraph(), Config(), Stopwatch())
+    worker = closing(LastSeesFirst(0), TruthfulVerifier(ring(3)))
+    slam = Slam(ScriptedOdometry(ring(3)), KeyframeBuilder(Config()), worker, PoseGraph(), Config(), Stopwatch())
     with pytest.raises(GraphError):
         slam.finish()
 

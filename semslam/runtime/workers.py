@@ -1,0 +1,142 @@
+"""Work that goes on beside the caller's, one job after the other, in the order in which jobs were submitted."""
+
+import os
+import signal
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
+from enum import StrEnum
+from threading import Thread
+from typing import Any, Generic, TypeVar
+
+from semslam.errors import SemslamError
+
+Job = TypeVar("Job")
+Answer = TypeVar("Answer")
+
+PARENT_CHECK_S = 1.0
+"""Seconds between two looks of a worker's process at whether its parent still lives."""
+
+Make = Callable[[], Callable[[Job], Answer]]
+"""Makes the function that does the work; a process needs one that can be pickled."""
+
+
+class WorkerKind(StrEnum):
+    """Where the work is done."""
+
+    PROCESS = "process"
+    THREAD = "thread"
+    NONE = "none"
+
+
+class Worker(ABC, Generic[Job, Answer]):
+    """Does one job after the other; the answers do not depend on where."""
+
+    @abstractmethod
+    def submit(self, job: Job) -> "Future[Answer]":
+        """Start a job; its future gives the answer, or raises what the work raised."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """Finish the jobs that are left, and end."""
+
+
+class InlineWorker(Worker[Job, Answer]):
+    """Does each job at once, in the caller's thread."""
+
+    def __init__(self, make: Make[Job, Answer]) -> None:
+        self._work = make()
+
+    def submit(self, job: Job) -> "Future[Answer]":
+        """See ``Worker``."""
+        future: Future[Answer] = Future()
+        try:
+            future.set_result(self._work(job))
+        except Exception as error:
+            future.set_exception(error)
+        return future
+
+    def close(self) -> None:
+        """Nothing is left to do."""
+
+
+class ThreadWorker(Worker[Job, Answer]):
+    """Does its jobs in a thread of this process."""
+
+    def __init__(self, make: Make[Job, Answer]) -> None:
+        self._work = make()
+        self._pool = ThreadPoolExecutor(max_workers=1, thread_name_prefix="semslam-worker")
+
+    def submit(self, job: Job) -> "Future[Answer]":
+        """See ``Worker``."""
+        return self._pool.submit(self._work, job)
+
+    def close(self) -> None:
+        """See ``Worker``."""
+        self._pool.shutdown(wait=True)
+
+
+class ProcessWorker(Worker[Job, Answer]):
+    """Does its jobs in a process of its own, which leaves the interpreter's lock to the caller.
+
+    The process does not import the caller's main module, so that scripts need no ``if __name__ == "__main__"``.
+    """
+
+    def __init__(self, make: Make[Job, Answer]) -> None:
+        from joblib.externals.loky.process_executor import ProcessPoolExecutor
+
+        self._pool = ProcessPoolExecutor(max_workers=1, initializer=_obey_the_parent)
+        self._ready: Future[None] = self._pool.submit(_prepare, make)
+
+    def submit(self, job: Job) -> "Future[Answer]":
+        """See ``Worker``."""
+        future: Future[Answer] = self._pool.submit(_work, job)
+        return future
+
+    def close(self) -> None:
+        """See ``Worker``."""
+        self._pool.shutdown(wait=True)
+
+
+def make_worker(kind: WorkerKind, make: Make[Job, Answer]) -> Worker[Job, Answer]:
+    """A worker of a kind.
+
+    Args:
+        kind: where the work is done.
+        make: makes the function that does it.
+    """
+    if kind is WorkerKind.PROCESS:
+        return ProcessWorker(make)
+    return ThreadWorker(make) if kind is WorkerKind.THREAD else InlineWorker(make)
+
+
+_prepared: list[Callable[[Any], Any] | SemslamError] = []
+"""In a worker's process: the function that does its work, or why there is none."""
+
+
+def _obey_the_parent() -> None:
+    """Leave signals to the parent, which a terminal sends Ctrl-C and a hang-up as well, and end when it is gone."""
+    for name in (signal.SIGINT, signal.SIGHUP):
+        signal.signal(name, signal.SIG_IGN)
+    Thread(target=_end_with, args=(os.getppid(),), daemon=True).start()
+
+
+def _end_with(parent: int) -> None:
+    while os.getppid() == parent:
+        time.sleep(PARENT_CHECK_S)
+    os._exit(1)
+
+
+def _prepare(make: Make[Any, Any]) -> None:
+    try:
+        _prepared.append(make())
+    except SemslamError as error:
+        _prepared.append(error)
+
+
+def _work(job: Any) -> Any:
+    (work,) = _prepared
+    if isinstance(work, SemslamError):
+        raise work
+    return work(job)

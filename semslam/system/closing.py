@@ -1,0 +1,117 @@
+"""What happens at a keyframe besides tracking: loops are searched, and the live graph takes them in."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+from semslam.backend.graph.products import Edge
+from semslam.backend.incremental import IncrementalPoseGraph
+from semslam.config import Config
+from semslam.loop.detector import NoLoops
+from semslam.loop.search import LoopSearch
+from semslam.loop.verification.verifier import LoopVerifier
+from semslam.runtime.stopwatch import Stopwatch
+from semslam.runtime.workers import Worker, WorkerKind, make_worker
+from semslam.types import FloatArray, Frame, Keyframe, LoopConstraint, Verification
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class KeyframeJob:
+    """A new keyframe, with what joins it to those before.
+
+    Attributes:
+        keyframe: the new one.
+        frame: its images.
+        odometry: from the keyframe before in the same map; None where a map begins.
+        covisible: edges to keyframes that see the same landmarks.
+    """
+
+    keyframe: Keyframe
+    frame: Frame
+    odometry: Edge | None
+    covisible: tuple[Edge, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class KeyframeAnswer:
+    """What became of it.
+
+    Attributes:
+        keyframe: its id.
+        verifications: what the verification made of each candidate, in order.
+        T_world_odom: (4, 4) takes poses of the keyframe's map from odometry's frame to the world as the loops have it.
+        accepted: match and query of the loops that the live graph follows from this keyframe on.
+        withdrawn: the same of those that it no longer follows.
+        seconds: time of each call, by stage.
+    """
+
+    keyframe: int
+    verifications: tuple[Verification, ...]
+    T_world_odom: FloatArray
+    accepted: tuple[tuple[int, int], ...]
+    withdrawn: tuple[tuple[int, int], ...]
+    seconds: Mapping[str, Sequence[float]]
+
+
+class LoopClosing:
+    """Searches each keyframe's loops and keeps the live graph, which holds all of them.
+
+    Args:
+        search: finds loops.
+        graph: takes them in as they come.
+        stopwatch: the one that ``search`` uses.
+    """
+
+    def __init__(self, search: LoopSearch, graph: IncrementalPoseGraph, stopwatch: Stopwatch) -> None:
+        self._search = search
+        self._graph = graph
+        self._stopwatch = stopwatch
+
+    def close(self, job: KeyframeJob) -> KeyframeAnswer:
+        """Take a keyframe in.
+
+        Raises:
+            GraphError: the live graph could not be updated.
+        """
+        keyframe = job.keyframe
+        verifications = tuple(self._search.search(keyframe, job.frame))
+        with self._stopwatch.stage("live_graph"):
+            self._graph.add_keyframe(keyframe.id, keyframe.T_odom_cam)
+            if job.odometry is not None:
+                edge = job.odometry
+                self._graph.add_odometry(edge.from_key, edge.to_key, edge.T_from_to, edge.covariance)
+            for edge in job.covisible:
+                self._graph.add_covisible(edge)
+            for verification in verifications:
+                if isinstance(verification, LoopConstraint):
+                    self._graph.add_loop(verification)
+            change = self._graph.update()
+            T_world_odom = self._graph.correction(keyframe.id)
+        return KeyframeAnswer(
+            keyframe.id, verifications, T_world_odom, change.accepted, change.withdrawn, self._stopwatch.take()
+        )
+
+
+def build_closing(
+    config: Config, kind: WorkerKind, verifier: LoopVerifier | None = None
+) -> Worker[KeyframeJob, KeyframeAnswer] | None:
+    """Loop closing as the settings ask for it; None where the detector is "none".
+
+    Args:
+        config: the settings.
+        kind: where it is done.
+        verifier: decides on candidates; None = the registered one. A process needs one that can be pickled.
+
+    Raises:
+        ConfigError: a name is unknown.
+        ModelError: the network's weights are missing or damaged; a process says so at the first keyframe's answer.
+    """
+    if config.detector == NoLoops.name:
+        return None
+    return make_worker(kind, partial(_make_closing, config, verifier))
+
+
+def _make_closing(config: Config, verifier: LoopVerifier | None) -> Callable[[KeyframeJob], KeyframeAnswer]:
+    stopwatch = Stopwatch()
+    search = LoopSearch.from_config(config, stopwatch, verifier=verifier)
+    return LoopClosing(search, IncrementalPoseGraph(config.backend), stopwatch).close
