@@ -78,7 +78,9 @@ def graph_command(
 
 def stress_command(
     run: RunFolder,
-    false_loops: Annotated[float, typer.Option(min=0.0, max=0.95, help="Share of false ones among all loops.")] = 0.3,
+    false_loops: Annotated[
+        float, typer.Option(min=0.0, max=0.95, callback=options.finite, help="Share of false ones among all loops.")
+    ] = 0.3,
     kind: Annotated[str, typer.Option(help="random, or consistent among themselves.")] = "random",
     backends: Annotated[str | None, typer.Option(help="Names joined by commas; default: all.")] = None,
     seed: options.Seed = None,

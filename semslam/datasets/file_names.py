@@ -6,12 +6,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 
-import numpy as np
+from semslam.datasets.time_units import EPOCH, MAX_DIGITS, read_stamp
 
-from semslam.datasets.time_units import EPOCH
-from semslam.geometry.se3 import FloatArray
-
-MAX_DIGITS = 20
 INDEX_MICROSECONDS = re.compile(r"(\d+)-(\d+)")
 """SUN3D: ``0000012-000000400424``, a frame number and microseconds since the first frame."""
 NUMBER = re.compile(r"\d+")
@@ -35,12 +31,12 @@ class NamedImages:
 
     Attributes:
         naming: what their numbers are.
-        values: (N,) frame numbers, or stamps in the unit of the names.
+        values: frame numbers, or stamps in the unit of the names.
         numbers: frame numbers, where there are any.
     """
 
     naming: Naming
-    values: FloatArray
+    values: list[float]
     numbers: list[int] | None
 
 
@@ -83,7 +79,7 @@ def _common_beginning(stems: Sequence[str]) -> str:
 def _named(naming: Naming, values: Sequence[str], numbers: Sequence[str] | None) -> NamedImages | None:
     if max(map(len, [*values, *(numbers or ())])) > MAX_DIGITS:
         return None
-    read = np.array([float(value) for value in values])
-    if len(np.unique(read)) != len(read):
+    read = [read_stamp(value) for value in values]
+    if len(set(read)) != len(read):
         return None
     return NamedImages(naming, read, None if numbers is None else [int(number) for number in numbers])

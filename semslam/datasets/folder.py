@@ -114,8 +114,8 @@ def _pair_numbers(
     config: DatasetConfig,
     notes: list[str],
 ) -> list[ImagePair]:
-    of_number = dict(zip(second.values.tolist(), depth, strict=True))
-    both = sorted((n, file) for n, file in zip(first.values.tolist(), color, strict=True) if n in of_number)
+    of_number = dict(zip(second.values, depth, strict=True))
+    both = sorted((n, file) for n, file in zip(first.values, color, strict=True) if n in of_number)
     refuse_most(len(color), len(depth), len(both), f"In {color[0].parent.parent}", "by the numbers in their names")
     _note_left(len(color) + len(depth) - 2 * len(both), "name", notes)
     return [ImagePair(n / config.fps, file, of_number[n], int(n)) for n, file in both]
@@ -131,7 +131,7 @@ def _pair_stamps(
 ) -> list[ImagePair]:
     unit = TimeUnit.MICROSECONDS if first.naming is Naming.INDEX_STAMPS else config.time_unit
     colors, depths = (
-        in_order(files[0].parent.name, named.values.tolist(), files, said, unit, named.numbers)
+        in_order(files[0].parent.name, named.values, files, said, unit, named.numbers)
         for files, named, said in ((color, first, notes), (depth, second, []))
     )
     return pair_by_time(colors, depths, config.association_window, color[0].parent.parent, notes)

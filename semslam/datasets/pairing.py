@@ -55,7 +55,7 @@ def in_order(
     """
     if not stamps:
         raise DatasetError(f"The list {name} names no image.")
-    times = to_seconds(np.array(stamps, dtype=np.float64), name, notes, unit)
+    times = to_seconds(stamps, name, notes, unit)
     finite = np.flatnonzero(np.isfinite(times))
     if lost := len(times) - len(finite):
         notes.append(f"{name}: {lost} images have no finite time stamp and are left out.")

@@ -1,5 +1,6 @@
 """Time stamps in seconds, milliseconds, microseconds or nanoseconds: recognised in one place for every reader."""
 
+from collections.abc import Sequence
 from enum import StrEnum
 
 import numpy as np
@@ -14,6 +15,7 @@ EPOCH_STEPS = (1e-4, 5.0)
 LONG_STEP = 2000.0
 """Stamps further apart than this are no seconds: half an hour."""
 SHORT_STEP = 8.0
+MAX_DIGITS = 20
 MIN_ROWS = 10
 """How many whole, unevenly spaced stamps it takes before small steps are believed to be milliseconds."""
 
@@ -27,9 +29,9 @@ class TimeUnit(StrEnum):
     NANOSECONDS = "ns"
 
     @property
-    def per_second(self) -> float:
+    def per_second(self) -> int:
         """How many make a second."""
-        return {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}[self.value]
+        return {"s": 1, "ms": 10**3, "us": 10**6, "ns": 10**9}[self.value]
 
     @property
     def plural(self) -> str:
@@ -37,11 +39,20 @@ class TimeUnit(StrEnum):
         return self.name.lower()
 
 
-def to_seconds(stamps: FloatArray, name: str, notes: list[str], unit: str | None = None) -> FloatArray:
+def read_stamp(text: str) -> float:
+    """A stamp as it is written; whole numbers keep every digit (nanoseconds since 1970 have more than a float).
+
+    Raises:
+        ValueError: it is no number.
+    """
+    return int(text) if text.isdecimal() and len(text) <= MAX_DIGITS else float(text)
+
+
+def to_seconds(stamps: Sequence[float], name: str, notes: list[str], unit: str | None = None) -> FloatArray:
     """Stamps (N,) in seconds; where they were something else, a note says so.
 
     Args:
-        stamps: as they stand in the file, in any order.
+        stamps: as ``read_stamp`` gives them, in any order.
         name: the file, for the note.
         notes: gets the note.
         unit: stated by the user, such as "ms"; None = recognised.
@@ -49,12 +60,14 @@ def to_seconds(stamps: FloatArray, name: str, notes: list[str], unit: str | None
     Raises:
         DatasetError: the unit cannot be recognised.
     """
-    found = TimeUnit(unit) if unit else recognise_unit(stamps, name)
+    as_read = np.array(stamps, dtype=np.float64)
+    found = TimeUnit(unit) if unit else recognise_unit(as_read, name)
     if found is TimeUnit.SECONDS:
-        return stamps
+        return as_read
     how = "as was stated" if unit else "which was recognised by their size and spacing"
-    notes.append(f"{name}: the time stamps are read as {found.plural}, {how}.")
-    return stamps / found.per_second
+    note = f"{name}: the time stamps are read as {found.plural}, {how}."
+    notes += [] if note in notes else [note]
+    return np.array([stamp / found.per_second for stamp in stamps], dtype=np.float64)
 
 
 def recognise_unit(stamps: FloatArray, name: str = "The file") -> TimeUnit:

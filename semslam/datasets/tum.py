@@ -12,7 +12,7 @@ from semslam.datasets.ground_truth import read_ground_truth
 from semslam.datasets.image_sequence import ImagePair, ImageSequence
 from semslam.datasets.images import IMAGE_SUFFIXES
 from semslam.datasets.pairing import ImageList, in_order, pair_by_time
-from semslam.datasets.time_units import are_frame_numbers
+from semslam.datasets.time_units import are_frame_numbers, read_stamp
 from semslam.errors import DatasetError, shortened
 from semslam.files import read_text
 
@@ -96,7 +96,7 @@ def _list_folder(folder: Path, notes: list[str], unit: str | None) -> ImageList:
     if not files:
         raise DatasetError(f"There is neither a list {folder}.txt nor any image in {folder}.")
     try:
-        stamps = [float(file.stem) for file in files]
+        stamps = [read_stamp(file.stem) for file in files]
     except ValueError as error:
         raise DatasetError(f"There is no list {folder}.txt, and the names in {folder} are no time stamps.") from error
     notes.append(f"There is no {folder.name}.txt; the time stamps were taken from the file names.")
@@ -134,6 +134,6 @@ def _lines(file: Path) -> list[tuple[int, str]]:
 
 def _stamp(file: Path, number: int, text: str) -> float:
     try:
-        return float(text)
+        return read_stamp(text)
     except ValueError as error:
         raise DatasetError(f"{file}, line {number}: '{shortened(text)}' is no time stamp.") from error

@@ -2,11 +2,12 @@
 
 import os
 import re
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from semslam.datasets.time_units import to_seconds
+from semslam.datasets.time_units import read_stamp, to_seconds
 from semslam.errors import DatasetError, TrajectoryError, shortened
 from semslam.files import read_text
 from semslam.geometry.se3 import FloatArray, quaternions_to_rotations, rotations_to_quaternions
@@ -21,6 +22,14 @@ MAX_VALUE = 1e12
 """Metres, and length of a quaternion, beyond which a row is rubbish."""
 UNIT_TOLERANCE = 0.01
 """How far a quaternion's norm may be off 1 before it is worth a note; files with four decimals are off by 1e-4."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Table:
+    """Rows (N, 8) of a trajectory file, and their stamps with every digit."""
+
+    rows: FloatArray
+    stamps: list[float]
 
 
 def read_trajectory(path: str | Path, unit: str | None = None) -> tuple[Trajectory, list[str]]:
@@ -44,22 +53,23 @@ def read_trajectory(path: str | Path, unit: str | None = None) -> tuple[Trajecto
     """
     path = Path(path)
     notes: list[str] = []
-    rows = _read_table(path, notes)
+    table = _read_table(path, notes)
+    rows = table.rows
     norms = np.linalg.norm(rows[:, 4:], axis=1)
     usable = np.isfinite(rows).all(axis=1) & (norms > 1e-6) & (np.abs(rows[:, 1:]) < MAX_VALUE).all(axis=1)
     if dropped := int((~usable).sum()):
         notes.append(f"{path.name}: {dropped} of {len(rows)} rows were dropped: not finite, or without a rotation.")
-    rows = rows[usable]
+    rows, stamps = rows[usable], [table.stamps[i] for i in np.flatnonzero(usable)]
     if not len(rows):
         raise TrajectoryError(f"The trajectory {path} holds no usable pose ({dropped} rows were not finite).")
     try:
-        rows[:, 0] = to_seconds(rows[:, 0], path.name, notes, unit)
+        rows[:, 0] = to_seconds(stamps, path.name, notes, unit)
     except DatasetError as error:
         raise TrajectoryError(str(error)) from error
     if (np.diff(rows[:, 0]) < 0).any():
         notes.append(f"{path.name}: the rows were not in order of time and have been sorted.")
-    stamps, first = np.unique(rows[:, 0], return_index=True)
-    if doubled := len(rows) - len(stamps):
+    seconds, first = np.unique(rows[:, 0], return_index=True)
+    if doubled := len(rows) - len(seconds):
         notes.append(f"{path.name}: {doubled} rows repeat a time stamp; the first of each was kept.")
     rows = rows[first]
     norms = np.linalg.norm(rows[:, 4:], axis=1)
@@ -68,10 +78,10 @@ def read_trajectory(path: str | Path, unit: str | None = None) -> tuple[Trajecto
     poses = np.tile(np.eye(4), (len(rows), 1, 1))
     poses[:, :3, :3] = quaternions_to_rotations(rows[:, 4:])
     poses[:, :3, 3] = rows[:, 1:4]
-    return Trajectory(stamps, poses), notes
+    return Trajectory(seconds, poses), notes
 
 
-def _read_table(path: Path, notes: list[str]) -> FloatArray:
+def _read_table(path: Path, notes: list[str]) -> _Table:
     """The eight columns of a trajectory file."""
     text = read_text(path, "The trajectory", TrajectoryError)
     lines = [line for line in text.splitlines() if line.split("#", 1)[0].strip()]
@@ -91,7 +101,15 @@ def _read_table(path: Path, notes: list[str]) -> FloatArray:
         rows = rows[:, :8]
     if rows.shape[1] != 8:
         raise TrajectoryError(f"{path} is no TUM trajectory ({COLUMNS}): its rows have {rows.shape[1]} columns.")
-    return rows
+    return _Table(rows, [_exact(line.split(separator)[0], row[0]) for line, row in zip(lines, rows, strict=True)])
+
+
+def _exact(word: str, value: float) -> float:
+    """A stamp with every digit, where the word is a plain number."""
+    try:
+        return read_stamp(word.strip())
+    except ValueError:  # such as a comment right behind it
+        return float(value)
 
 
 def write_trajectory(path: str | Path, trajectory: Trajectory) -> None:
