@@ -7,6 +7,7 @@ from semslam.backend.graph.products import Edge, GraphSolution, LoopVerdict, Pos
 from semslam.backend.optimization import GraphProblem, optimize_graph
 from semslam.config import BackendConfig
 from semslam.errors import GraphError
+from semslam.geometry.poses import PoseLike
 from semslam.types import FloatArray, LoopConstraint
 
 __all__ = ["Edge", "GraphSolution", "LoopVerdict", "PoseGraph", "PosedGraph"]
@@ -38,7 +39,7 @@ class PoseGraph:
         """The pose (4, 4) that a keyframe was given: its prior, or else what it was added with."""
         return self._priors.get(key, self._poses[key])
 
-    def add_keyframe(self, key: int, T_world_cam: npt.ArrayLike) -> None:
+    def add_keyframe(self, key: int, T_world_cam: PoseLike) -> None:
         """Add a keyframe with the pose (4, 4) to start from.
 
         Raises:
@@ -48,7 +49,7 @@ class PoseGraph:
             raise GraphError(f"Keyframe {key} is in the graph already.")
         self._poses[key] = checked_pose(T_world_cam, f"The pose of keyframe {key}")
 
-    def add_prior(self, key: int, T_world_cam: npt.ArrayLike) -> None:
+    def add_prior(self, key: int, T_world_cam: PoseLike) -> None:
         """Anchor the map of a keyframe at a pose (4, 4).
 
         Raises:
@@ -59,7 +60,7 @@ class PoseGraph:
             raise GraphError(f"Keyframe {key} has a prior already.")
         self._priors[key] = checked_pose(T_world_cam, f"The prior of keyframe {key}")
 
-    def add_odometry(self, from_key: int, to_key: int, T_from_to: npt.ArrayLike, covariance: npt.ArrayLike) -> Edge:
+    def add_odometry(self, from_key: int, to_key: int, T_from_to: PoseLike, covariance: npt.ArrayLike) -> Edge:
         """Join two keyframes by a trusted relative pose (4, 4) with covariance (6, 6), rotation first.
 
         Raises:

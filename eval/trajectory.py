@@ -15,6 +15,7 @@ from semslam.types import Trajectory
 MAX_DIFFERENCE = 0.02
 RPE_INTERVAL = 1.0
 MIN_PAIRS = 3
+MIN_COVERAGE = 0.5
 TRIPOD = 1e-3
 
 BoolArray = npt.NDArray[np.bool_]
@@ -190,6 +191,13 @@ def coverage(timestamps: npt.ArrayLike, truth: Trajectory, window: float = MAX_D
     if not len(stamps) or not len(truth):
         return 0.0
     return float(np.mean(np.abs(truth.timestamps[_nearest(truth.timestamps, stamps)] - stamps) <= window))
+
+
+def coverage_remark(pairs: int | None, poses: int) -> str | None:
+    """A warning where errors are of less than half of the poses, which says little of the others; else None."""
+    if not pairs or pairs >= MIN_COVERAGE * poses:
+        return None
+    return f"The errors are of {pairs} of {poses} poses ({100 * pairs / poses:.0f} %); the others are not scored."
 
 
 def poses_at(truth: Trajectory, timestamps: npt.ArrayLike, max_gap: float = 0.1) -> tuple[FloatArray, BoolArray]:

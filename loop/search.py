@@ -76,7 +76,7 @@ class LoopSearch:
         """
         if labels is None and self._segmenter is not None:
             with self._stopwatch.stage("segmentation"):
-                labels = self._segmenter.segment(frame.color, frame.index)
+                labels = self._segmenter.segment(frame.color, frame.source_index)
         view = KeyframeView(keyframe, frame.color, frame.depth, labels)
         with self._stopwatch.stage("query"):
             candidates = self._detector.query(view)

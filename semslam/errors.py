@@ -1,12 +1,31 @@
 """The one family of errors that semslam raises for what a user can mend, and its warning."""
 
 
+def printable(text: str) -> str:
+    """Text that is safe on a terminal: control characters, escapes and the like as their codes."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)
+
+
+def shortened(text: str, limit: int = 80) -> str:
+    """Text of at most ``limit`` characters, for values from outside in a message."""
+    return text if len(text) <= limit else f"{text[: limit - 3]}..."
+
+
 class SemslamError(Exception):
-    """Something is wrong with the input, a setting or the machine; the message is one clear sentence."""
+    """Something is wrong with the input, a setting or the machine; the message is one clear sentence.
+
+    Names and values from files stand in the message, so control characters are taken out of it.
+    """
+
+    def __init__(self, sentence: str = "") -> None:
+        super().__init__(printable(sentence))
 
 
 class SemslamWarning(UserWarning):
     """Something was left out or passed over; the message is one clear sentence."""
+
+    def __init__(self, sentence: str = "") -> None:
+        super().__init__(printable(sentence))
 
 
 class DatasetError(SemslamError):

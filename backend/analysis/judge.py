@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 
+from semslam.backend.graph.keys import chain_of
 from semslam.backend.graph.products import Edge, GraphSolution, PosedGraph
 from semslam.backend.pose_graph import PoseGraph
 from semslam.config import BackendConfig
@@ -12,7 +13,8 @@ from semslam.types import FloatArray, LoopCandidate, LoopConstraint
 def judge_graph(graph: PosedGraph, config: BackendConfig) -> GraphSolution:
     """Optimise a graph as it was read, with a verdict for each of its loops.
 
-    Edges between keys that follow one another are odometry; all others are loops.
+    Edges between keys that follow one another in one chain (``keys.chain_of``) are odometry; all others, and those
+    that the file states to be, are loops.
 
     Raises:
         GraphError: the graph is malformed or cannot be optimised.
@@ -23,7 +25,11 @@ def judge_graph(graph: PosedGraph, config: BackendConfig) -> GraphSolution:
 
 
 def split_edges(graph: PosedGraph | GraphSolution) -> tuple[tuple[Edge, ...], tuple[Edge, ...]]:
-    """Odometry and loops of a graph; a second edge between neighbours counts as a loop."""
+    """Odometry and loops of a graph; a second edge between neighbours counts as a loop.
+
+    Raises:
+        GraphError: an edge joins a keyframe that is not in the graph.
+    """
     order = {key: place for place, key in enumerate(sorted(graph.poses))}
     odometry: dict[tuple[int, int], Edge] = {}
     loops: list[Edge] = []
@@ -31,7 +37,8 @@ def split_edges(graph: PosedGraph | GraphSolution) -> tuple[tuple[Edge, ...], tu
         pair = (min(edge.from_key, edge.to_key), max(edge.from_key, edge.to_key))
         if pair[0] not in order or pair[1] not in order:
             raise GraphError(f"An edge joins the keyframes {pair[0]} and {pair[1]}, of which one is not in the graph.")
-        if order[pair[1]] - order[pair[0]] == 1 and pair not in odometry:
+        follows = order[pair[1]] - order[pair[0]] == 1 and chain_of(pair[0]) == chain_of(pair[1])
+        if follows and not edge.is_loop and pair not in odometry:
             odometry[pair] = edge
         else:
             loops.append(edge)

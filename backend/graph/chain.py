@@ -6,6 +6,7 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
+from semslam.backend.graph.keys import chain_of
 from semslam.backend.graph.products import Edge
 from semslam.geometry.se3 import adjoint, invert, orthonormalise, rotation_angle
 from semslam.types import FloatArray, IntArray
@@ -16,7 +17,8 @@ BoolArray = npt.NDArray[np.bool_]
 class OdometryChain:
     """Odometry summed up from keyframe to keyframe, so that any pair is answered at once.
 
-    A chain runs through keys that follow one another and are joined by an edge; it breaks where they are not.
+    A chain runs through keys of one trajectory that follow one another and are joined by an edge; it breaks where
+    they are not.
     Covariances are summed in the frame of the chain's start by the adjoint, to first order.
     """
 
@@ -29,7 +31,7 @@ class OdometryChain:
         self._chain = np.zeros(len(ordered), dtype=np.int64)
         for row, (last, key) in enumerate(pairwise(ordered), 1):
             forward, backward = steps.get((last, key)), steps.get((key, last))
-            edge = forward or backward
+            edge = (forward or backward) if chain_of(last) == chain_of(key) else None
             self._chain[row] = self._chain[row - 1] + (edge is None)
             if edge is None:
                 continue

@@ -15,12 +15,14 @@ class Edge:
         to_key: keyframe that is measured.
         T_from_to: (4, 4) pose of ``to_key`` in ``from_key``.
         covariance: (6, 6) of T_from_to.
+        is_loop: stated to be a loop closure, whichever keys it joins.
     """
 
     from_key: int
     to_key: int
     T_from_to: FloatArray
     covariance: FloatArray
+    is_loop: bool = False
 
     def widened(self, factor: float) -> "Edge":
         """The same measurement with ``factor`` times the standard deviations."""
@@ -35,11 +37,13 @@ class PosedGraph:
         poses: (4, 4) T_world_cam by key.
         edges: relative poses, in the order of the file.
         anchors: keys whose poses are held (g2o's FIX).
+        notes: what of the file was read in another way or left out, a sentence each.
     """
 
     poses: dict[int, FloatArray]
     edges: tuple[Edge, ...]
     anchors: tuple[int, ...] = ()
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -7,14 +7,16 @@ camera and its depth_scale.
 
 import csv
 from functools import partial
+from io import StringIO
 from pathlib import Path
 
 import numpy as np
 
 from semslam.datasets.camera_file import CameraSetup, read_camera
-from semslam.datasets.images import read_color, read_depth
+from semslam.datasets.images import DepthScale, read_color, read_depth
 from semslam.errors import DatasetError
 from semslam.eval.pairs.judging import Pair, PairGroup
+from semslam.files import read_text
 from semslam.types import Frame
 
 COLUMNS = ("first", "second", "same", "group")
@@ -29,14 +31,14 @@ def read_pair_folder(folder: Path) -> list[Pair]:
         DatasetError: the CSV or camera file is missing or malformed; the message names the line.
     """
     table = folder / "pairs.csv"
+    text = read_text(table, "The list of pairs", DatasetError)
     try:
-        with table.open(newline="", encoding="utf-8-sig") as file:
-            reader = csv.DictReader(file)
-            missing = [name for name in COLUMNS if name not in (reader.fieldnames or ())]
-            if missing:
-                raise DatasetError(f"{table} lacks the column {missing[0]}; it needs {', '.join(COLUMNS)}.")
-            rows = [(reader.line_num, row) for row in reader]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        reader = csv.DictReader(StringIO(text, newline=""))
+        missing = [name for name in COLUMNS if name not in (reader.fieldnames or ())]
+        if missing:
+            raise DatasetError(f"{table} lacks the column {missing[0]}; it needs {', '.join(COLUMNS)}.")
+        rows = [(reader.line_num, row) for row in reader]
+    except csv.Error as error:
         raise DatasetError(f"The list of pairs {table} cannot be read: {error}.") from error
     camera = read_camera(folder / "camera.yaml")
     return [_pair(folder, camera, row, f"{table}, line {line}") for line, row in rows]
@@ -64,5 +66,5 @@ def _load(files: list[tuple[Path, Path | None]], camera: CameraSetup, side: int)
     if depth_file is not None:
         if camera.depth_scale is None:
             raise DatasetError(f"The camera file beside {color_file.name} must say depth_scale, as there is depth.")
-        depth = read_depth(depth_file, camera.depth_scale, size)
+        depth = read_depth(depth_file, DepthScale(camera.depth_scale, camera.depth_scale), size)
     return Frame(side, float(side), color, depth, camera.intrinsics)

@@ -3,11 +3,12 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-import cv2
 import numpy as np
 import numpy.typing as npt
 
+from semslam.datasets.images import read_color, read_labels
 from semslam.errors import DatasetError
+from semslam.files import read_text
 from semslam.loop.segmentation.classes import CLASS_COUNT
 
 UInt8Array = npt.NDArray[np.uint8]
@@ -32,22 +33,10 @@ def list_names(directory: Path, split: str) -> list[str]:
     path = directory / split
     if not path.is_file():
         raise DatasetError(f"There is no list of photos at {path}.")
-    names = path.read_text(encoding="utf-8").split()
+    names = read_text(path, "The list of photos", DatasetError).split()
     if not names:
         raise DatasetError(f"The list of photos {path} is empty.")
     return names
-
-
-def read_color(path: Path) -> UInt8Array:
-    """Read an image as (H, W, 3) uint8 RGB.
-
-    Raises:
-        DatasetError: the file is missing or no image.
-    """
-    image = cv2.imread(str(path), cv2.IMREAD_COLOR) if path.is_file() else None
-    if image is None:
-        raise DatasetError(f"The photo {path} is missing or cannot be read.")
-    return np.ascontiguousarray(image[:, :, ::-1], dtype=np.uint8)
 
 
 def read_photo(directory: Path, name: str) -> Photo:
@@ -59,14 +48,10 @@ def read_photo(directory: Path, name: str) -> Photo:
     paths = [directory / "rgb" / f"{name}{suffix}" for suffix in _SUFFIXES]
     color = read_color(next((p for p in paths if p.is_file()), paths[0]))
     label_path = directory / "labels40" / f"{name}.png"
-    labels = cv2.imread(str(label_path), cv2.IMREAD_UNCHANGED) if label_path.is_file() else None
-    if labels is None or labels.ndim != 2:
-        raise DatasetError(f"The label image {label_path} is missing or not a one-channel PNG.")
+    labels = read_labels(label_path, classes=CLASS_COUNT + 1)
     if labels.shape != color.shape[:2]:
         raise DatasetError(f"The label image {label_path} has another size than its photo.")
-    if labels.max(initial=0) > CLASS_COUNT:
-        raise DatasetError(f"The label image {label_path} holds labels beyond {CLASS_COUNT}.")
-    return Photo(name, color, labels.astype(np.uint8))
+    return Photo(name, color, labels)
 
 
 def read_photos(directory: Path, split: str) -> list[Photo]:

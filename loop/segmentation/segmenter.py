@@ -37,5 +37,5 @@ class Segmenter(Protocol):
 
         Args:
             color: the image.
-            frame_index: its place in the sequence, for segmenters that look labels up.
+            frame_index: the frame's ``source_index``, for segmenters that look labels up.
         """

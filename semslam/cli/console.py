@@ -3,34 +3,50 @@
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
 from rich.text import Text
 
+from semslam.errors import printable
+
 if TYPE_CHECKING:
     from semslam.runs.metrics import LoopMetrics, Metrics
     from semslam.system.result import FrameState
 
+
+class PlainConsole(Console):
+    """A console that shows texts as they are: no markup, no emoji codes, and no control characters out of files."""
+
+    def render_str(self, text: str, **options: Any) -> Text:
+        """Turn a text into what is drawn."""
+        return super().render_str(shown(text), **options)
+
+
+def shown(text: str) -> str:
+    """Text that is safe on a terminal, with its line breaks."""
+    return "\n".join(map(printable, text.split("\n")))
+
+
 PIPED_WIDTH = 120
 # A file or a pipe has no width of its own; 80 columns would fold the wider tables.
-out = Console(width=None if sys.stdout.isatty() else PIPED_WIDTH)
-err = Console(stderr=True)
+out = PlainConsole(width=None if sys.stdout.isatty() else PIPED_WIDTH, markup=False, emoji=False)
+err = PlainConsole(stderr=True, markup=False, emoji=False)
 
 
 def complain(sentence: str) -> None:
     """Print one sentence to standard error."""
-    err.print(Text("semslam: ", style="bold red") + Text(sentence), soft_wrap=True)
+    err.print(Text("semslam: ", style="bold red") + Text(shown(sentence)), soft_wrap=True)
 
 
 def remark(sentence: str) -> None:
     """Print a remark to standard error."""
-    err.print(Text(sentence, style="yellow"), soft_wrap=True)
+    err.print(Text(shown(sentence), style="yellow"), soft_wrap=True)
 
 
-def remarks(sentences: Sequence[str], most: int = 5) -> None:
+def remarks(sentences: Sequence[str], most: int = 8) -> None:
     """Print the first remarks, and how many more there are."""
     for sentence in sentences[:most]:
         remark(sentence)
@@ -41,11 +57,11 @@ def remarks(sentences: Sequence[str], most: int = 5) -> None:
 @contextmanager
 def bar(title: str, total: int | None, unit: str = "frames") -> Iterator[Callable[[int, int | None], None]]:
     """Show a progress bar; the function given sets how much is done, and of how much where that is known by now."""
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn(unit))
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn(), TextColumn(unit))
     with Progress(
         *columns, TimeElapsedColumn(), TimeRemainingColumn(), console=err, transient=True, disable=not err.is_terminal
     ) as progress:
-        task = progress.add_task(title, total=total)
+        task = progress.add_task(shown(title), total=total)
         yield lambda done, whole: progress.update(task, completed=done, total=whole)
 
 

@@ -11,7 +11,7 @@ from rich.table import Table
 
 from semslam.cli import options
 from semslam.cli.command import Command, example
-from semslam.cli.console import out, remark
+from semslam.cli.console import out, remark, remarks
 from semslam.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -58,8 +58,10 @@ def graph_command(
     """Optimise a graph from elsewhere and judge its loops."""
     from semslam.backend.analysis.judge import judge_graph
     from semslam.backend.graph.g2o import read_g2o, write_g2o
+    from semslam.backend.graph.keys import key_name
 
     graph = read_g2o(file)
+    remarks(graph.notes)
     solution = judge_graph(graph, options.settings(config, overrides).backend)
     accepted = sum(verdict.accepted for verdict in solution.verdicts)
     out.print(f"{len(graph.poses)} poses, {len(graph.edges)} edges, {len(solution.components)} connected parts")
@@ -67,7 +69,8 @@ def graph_command(
     worst = sorted((v for v in solution.verdicts if not v.accepted), key=lambda v: -v.residual)
     for v in worst[:20]:
         pair = v.constraint.candidate
-        out.print(f"  refused: {pair.match} - {pair.query}, {v.residual:.1f} standard deviations off")
+        ends = f"{key_name(pair.match)} - {key_name(pair.query)}"
+        out.print(f"  refused: {ends}, {v.residual:.1f} standard deviations off")
     if out_file is not None:
         write_g2o(out_file, solution)
         out.print(f"Written to {out_file}", soft_wrap=True)
@@ -75,7 +78,9 @@ def graph_command(
 
 def stress_command(
     run: RunFolder,
-    false_loops: Annotated[float, typer.Option(min=0.0, max=0.95, help="Share of false ones among all loops.")] = 0.3,
+    false_loops: Annotated[
+        float, typer.Option(min=0.0, max=0.95, callback=options.finite, help="Share of false ones among all loops.")
+    ] = 0.3,
     kind: Annotated[str, typer.Option(help="random, or consistent among themselves.")] = "random",
     backends: Annotated[str | None, typer.Option(help="Names joined by commas; default: all.")] = None,
     seed: options.Seed = None,

@@ -1,5 +1,6 @@
 """Options that several commands share."""
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -10,6 +11,7 @@ from semslam.errors import ConfigError
 if TYPE_CHECKING:
     from semslam.config import Config
 
+MOST = 2**31 - 1
 SEQUENCE_HELP = "A sequence: a folder (TUM, 7-Scenes, generic), a .bag or synthetic:..."
 Sequence = Annotated[str, typer.Argument(help=SEQUENCE_HELP)]
 Odometry = Annotated[str | None, typer.Option("--odometry", help="Registered odometry.")]
@@ -17,11 +19,18 @@ Detector = Annotated[str | None, typer.Option("--detector", help="Registered loo
 Loader = Annotated[str | None, typer.Option("--loader", help="Dataset loader; guessed from the path by default.")]
 ConfigFile = Annotated[Path | None, typer.Option("--config", help="YAML settings (see 'semslam config').")]
 Settings = Annotated[list[str] | None, typer.Option("--set", help="A setting, section.key=value; may be repeated.")]
-Seed = Annotated[int | None, typer.Option("--seed", min=0, help="Seed of everything random.")]
-Start = Annotated[int, typer.Option("--start", min=0, help="First frame.")]
-MaxFrames = Annotated[int | None, typer.Option("--max-frames", min=1, help="Frames at the most.")]
-Stride = Annotated[int, typer.Option("--stride", min=1, help="Take every n-th frame.")]
+Seed = Annotated[int | None, typer.Option("--seed", min=0, max=2**31 - 1, help="Seed of everything random.")]
+Start = Annotated[int, typer.Option("--start", min=0, max=MOST, help="First frame.")]
+MaxFrames = Annotated[int | None, typer.Option("--max-frames", min=1, max=MOST, help="Frames at the most.")]
+Stride = Annotated[int, typer.Option("--stride", min=1, max=MOST, help="Take every n-th frame.")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON on standard output.")]
+
+
+def finite(value: float) -> float:
+    """Refuse a number that is none: NaN lies within any range."""
+    if not math.isfinite(value):
+        raise typer.BadParameter("it must be a finite number.")
+    return value
 
 
 def settings(

@@ -24,17 +24,21 @@ GROUPS = ("viewpoint", "illumination", "objects")
 def eval_command(
     estimate: Annotated[Path, typer.Argument(help="Estimated trajectory, TUM format.")],
     truth: Annotated[Path, typer.Argument(help="Ground truth, TUM format.")],
-    max_difference: Annotated[float, typer.Option(min=0.0, help="Seconds that associated stamps may differ.")] = 0.02,
+    max_difference: Annotated[
+        float, typer.Option(min=0.0, callback=options.finite, help="Seconds that associated stamps may differ.")
+    ] = 0.02,
     as_json: options.Json = False,
 ) -> None:
     """Score a trajectory file against ground truth."""
     from semslam.datasets.tum_format import read_trajectory
-    from semslam.eval.trajectory import coverage, score_trajectory
+    from semslam.eval.trajectory import coverage, coverage_remark, score_trajectory
     from semslam.runs.metrics import TrajectoryMetrics
 
     (estimated, estimate_notes), (true, truth_notes) = read_trajectory(estimate), read_trajectory(truth)
-    score = score_trajectory(estimated, true, max_difference)
     remarks([*estimate_notes, *truth_notes])
+    score = score_trajectory(estimated, true, max_difference)
+    few = coverage_remark(score.pairs, len(estimated))
+    remarks([] if few is None else [few])
     metrics = TrajectoryMetrics.from_score(score)
     if as_json:
         typer.echo(json.dumps(metrics.model_dump(mode="json")))
@@ -50,7 +54,7 @@ def eval_command(
 def loops_command(
     sequence: options.Sequence,
     detectors: Annotated[str, typer.Option("--detectors", help="Names joined by commas.")] = "semantic-paper,semantic",
-    every: Annotated[int, typer.Option(min=1, help="Frames from one keyframe to the next.")] = 5,
+    every: Annotated[int, typer.Option(min=1, max=options.MOST, help="Frames from one keyframe to the next.")] = 5,
     out_directory: Annotated[Path, typer.Option("--out", help="Folder for loops.json and the figure.")] = Path("loops"),
     odometry: options.Odometry = None,
     config: options.ConfigFile = None,
@@ -105,8 +109,12 @@ def pairs_command(
     detectors: Annotated[
         str, typer.Option("--detectors", help="Names joined by commas.")
     ] = "semantic-paper,semantic,fused,sda,dbow,cnnw,conv3",
-    every: Annotated[int, typer.Option(min=1, help="Frames from one that may be chosen to the next.")] = 5,
-    count: Annotated[int, typer.Option(min=2, help="Pairs of each group and sequence at the most.")] = 50,
+    every: Annotated[
+        int, typer.Option(min=1, max=options.MOST, help="Frames from one that may be chosen to the next.")
+    ] = 5,
+    count: Annotated[
+        int, typer.Option(min=2, max=options.MOST, help="Pairs of each group and sequence at the most.")
+    ] = 50,
     out_directory: Annotated[Path, typer.Option("--out", help="Folder for the results.")] = Path("pairs"),
     config: options.ConfigFile = None,
     overrides: options.Settings = None,

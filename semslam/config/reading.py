@@ -6,11 +6,12 @@ from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
-import yaml
 from pydantic import ValidationError
 
 from semslam.config.settings import Config, merged, validated
-from semslam.errors import ConfigError, SemslamWarning
+from semslam.config.strict_yaml import load_yaml
+from semslam.errors import ConfigError, SemslamWarning, shortened
+from semslam.files import read_text
 
 RENAMED = {
     "features": "keypoints",
@@ -23,6 +24,8 @@ RENAMED = {
     "feature_map.min_share": "feature_map.insert_share",
 }
 """Settings of earlier versions and what they are called now."""
+
+MAX_FILE_BYTES = 4_000_000
 
 
 def load_config(path: Path | None = None, overrides: Mapping[str, Any] | None = None) -> Config:
@@ -74,23 +77,24 @@ def parse_overrides(settings: list[str]) -> dict[str, Any]:
     for text in settings:
         dotted, equals, written = text.partition("=")
         if not equals:
-            raise ConfigError(f"A setting is written section.key=value, not '{text}'.")
+            raise ConfigError(f"A setting is written section.key=value, not '{shortened(text)}'.")
         try:
-            value = yaml.safe_load(written)
-        except yaml.YAMLError as error:
-            raise ConfigError(f"The value in '{text}' is not readable.") from error
+            value = load_yaml(written)
+        except ConfigError as error:
+            raise ConfigError(f"The value of '{shortened(dotted)}' is not readable: {error}.") from error
         _put(nested, dotted.strip(), value)
     return nested
 
 
 def _read(path: Path) -> dict[Any, Any]:
+    text = read_text(path, "The settings file", ConfigError, MAX_FILE_BYTES)
     try:
-        values = yaml.safe_load(path.read_text(encoding="utf-8")) or {}
-    except (OSError, UnicodeDecodeError) as error:
-        raise ConfigError(f"The settings file {path} cannot be read: {error}.") from error
-    except yaml.YAMLError as error:
-        raise ConfigError(f"The settings file {path} is not YAML: {' '.join(str(error).split())}.") from error
-    if not isinstance(values, dict):
+        values = load_yaml(text)
+    except ConfigError as error:
+        raise ConfigError(f"The settings file {path} is not usable YAML: {error}.") from error
+    if values is None:
+        return {}
+    if not isinstance(values, dict) or not all(isinstance(key, str) for key in values):
         raise ConfigError(f"The settings file {path} must hold 'key: value' pairs.")
     return values
 

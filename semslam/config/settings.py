@@ -17,7 +17,7 @@ from semslam.config.loops import LoopConfig
 from semslam.config.section import Section, setting
 from semslam.config.segmentation import SegmentationConfig, TrainingConfig
 from semslam.config.verification import VerificationConfig
-from semslam.errors import ConfigError
+from semslam.errors import ConfigError, shortened
 
 SectionT = TypeVar("SectionT", bound=Section)
 
@@ -155,8 +155,11 @@ def validated(model: type[ConfigT], values: Mapping[str, Any]) -> ConfigT:
         first = error.errors(include_url=False)[0]
         where = ".".join(str(part) for part in first["loc"]) or "settings"
         if first["type"] == "extra_forbidden":
-            raise ConfigError(f"There is no setting '{where}' (see 'semslam config' for all of them).") from error
-        raise ConfigError(f"Setting '{where}': {first['msg'].lower()}, not {first['input']!r}.") from error
+            raise ConfigError(
+                f"There is no setting '{shortened(where)}' (see 'semslam config' for all of them)."
+            ) from error
+        given = shortened(repr(first["input"]))
+        raise ConfigError(f"Setting '{shortened(where)}': {first['msg'].lower()}, not {given}.") from error
 
 
 def _checked(kind: type[Section], name: str, value: Any) -> Section:

@@ -14,6 +14,11 @@ from semslam.errors import ConfigError, DatasetError
 __all__ = ["Dataset", "DatasetLoader", "open_dataset"]
 
 SYNTHETIC = "synthetic"
+LOADER_SETTINGS = (
+    "camera", "depth_scale", "association_window", "fps", "time_unit", "register_depth",
+    "color_topic", "depth_topic", "camera_topic",
+)  # fmt: skip
+"""Settings that are for the loader; a loader names those it uses in its class attribute ``reads``."""
 
 
 def open_dataset(path: str | Path, config: DatasetConfig | None = None, *, loader: str | None = None) -> Dataset:
@@ -30,14 +35,20 @@ def open_dataset(path: str | Path, config: DatasetConfig | None = None, *, loade
     Raises:
         DatasetError: there is no such path, it is no sequence, or its lists are not usable.
         TrajectoryError: its ground truth is not readable.
-        ConfigError: the loader's name is unknown.
+        ConfigError: the loader's name is unknown, or a setting is given that it does not use.
     """
     config = config or DatasetConfig()
+    if "\0" in str(path):
+        raise DatasetError(f"{path} is no path: it holds a NUL.")
     try:
         name = loader or config.loader or guess_loader(path)
-        dataset: Dataset = plugins.load("semslam.datasets", name).open(path, config)
+        kind: type[DatasetLoader] = plugins.load("semslam.datasets", name)
+        _refuse_unused(name, kind, config)
+        dataset: Dataset = kind.open(path, config)
     except OSError as error:
         raise DatasetError(f"{path} cannot be read: {error.strerror or error}.") from error
+    except UnicodeError as error:
+        raise DatasetError(f"{path} is no path.") from error
     if config.faults != type(config.faults)():
         from semslam.datasets.faults import FaultyDataset
 
@@ -47,6 +58,14 @@ def open_dataset(path: str | Path, config: DatasetConfig | None = None, *, loade
 
         dataset = Selection(dataset, config.start, config.max_frames, config.stride)
     return dataset
+
+
+def _refuse_unused(name: str, kind: type[DatasetLoader], config: DatasetConfig) -> None:
+    """Refuse settings other than the defaults that the loader states not to use; one that states nothing may."""
+    used = getattr(kind, "reads", LOADER_SETTINGS)
+    for setting in LOADER_SETTINGS:
+        if setting not in used and getattr(config, setting) != DatasetConfig.model_fields[setting].default:
+            raise ConfigError(f"The loader '{name}' does not use the setting 'dataset.{setting}'.")
 
 
 def guess_loader(path: str | Path) -> str:

@@ -4,15 +4,20 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import yaml
 
-from semslam.errors import ConfigError, DatasetError
+from semslam.config.strict_yaml import load_yaml
+from semslam.datasets.images import DepthScale
+from semslam.errors import ConfigError, DatasetError, shortened
+from semslam.files import read_text
 from semslam.geometry.camera import NO_DISTORTION, Intrinsics
 
 CAMERA_FILE = "camera.yaml"
 _REQUIRED = ("width", "height", "fx", "fy", "cx", "cy")
 _OPTIONAL = ("distortion", "depth_scale", "readout")
+MAX_FILE_BYTES = 1_000_000
+MAX_NUMBER = 1e9
+"""No size, focal length or depth scale comes near to it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,6 +27,8 @@ class CameraSetup:
     Attributes:
         intrinsics: the camera; fy is positive.
         depth_scale: units of the depth images per metre, or None where the source does not say.
+        scale_stated: whether a user or the sequence's own file states it, so that it holds for floating-point
+            depth too.
         y_up: the source gave a negative fy: its poses are those of a camera whose y axis points up
             (ICL-NUIM), and have to be mirrored.
     """
@@ -29,6 +36,12 @@ class CameraSetup:
     intrinsics: Intrinsics
     depth_scale: float | None = None
     y_up: bool = False
+    scale_stated: bool = False
+
+    def depth(self, default: float) -> DepthScale:
+        """The scale of depth images; ``default`` units per metre are assumed where there is none."""
+        units = self.depth_scale or default
+        return DepthScale(units, units if self.scale_stated else 1.0, assumed=self.depth_scale is None)
 
 
 def read_camera(path: Path) -> CameraSetup:
@@ -57,7 +70,7 @@ def read_camera(path: Path) -> CameraSetup:
         intrinsics = Intrinsics(int(width), int(height), fx, abs(fy), cx, cy, distortion, readout)
     except ConfigError as error:
         raise DatasetError(f"The camera file {path}: {error}") from error
-    return CameraSetup(intrinsics, depth_scale, y_up=fy < 0)
+    return CameraSetup(intrinsics, depth_scale, y_up=fy < 0, scale_stated=depth_scale is not None)
 
 
 def write_camera(path: Path, intrinsics: Intrinsics, depth_scale: float) -> None:
@@ -82,12 +95,11 @@ def write_camera(path: Path, intrinsics: Intrinsics, depth_scale: float) -> None
 
 
 def _load(path: Path) -> dict[str, Any]:
+    text = read_text(path, "The camera file", DatasetError, MAX_FILE_BYTES)
     try:
-        values = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise DatasetError(f"The camera file {path} cannot be read: {error.strerror}.") from error
-    except (UnicodeDecodeError, yaml.YAMLError) as error:
-        raise DatasetError(f"The camera file {path} is not YAML.") from error
+        values = load_yaml(text)
+    except ConfigError as error:
+        raise DatasetError(f"The camera file {path} is not YAML that can be used: {error}.") from error
     if not isinstance(values, dict):
         raise DatasetError(f"The camera file {path} must hold 'key: value' pairs such as 'fx: 525.0'.")
     return {str(key): value for key, value in values.items()}
@@ -95,8 +107,8 @@ def _load(path: Path) -> dict[str, Any]:
 
 def _number(values: dict[str, Any], key: str, path: Path) -> float:
     value = values[key]
-    if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
-        raise DatasetError(f"The camera file {path}: '{key}' must be a number, not {value!r}.")
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) < MAX_NUMBER:
+        raise DatasetError(f"The camera file {path}: '{key}' must be a number, not {shortened(repr(value))}.")
     return float(value)
 
 

@@ -1,4 +1,4 @@
-"""Cameras of the public sequences, known by the folder's name, and which source of a camera wins."""
+"""Cameras of the public sequences, known by their files or the folder's name, and which source of a camera wins."""
 
 import re
 from collections.abc import Callable
@@ -15,6 +15,8 @@ from semslam.geometry.se3 import FloatArray, make_transform, orthonormalise
 TUM_DEPTH_SCALE = 5000.0
 KINECT_READOUT = 0.026
 """Seconds that the colour camera of a Kinect or Xtion takes from its first row to its last; estimated on fr1/rpy."""
+LISTS = ("rgb.txt", "depth.txt", "groundtruth.txt", "accelerometer.txt")
+COMMENT_BYTES = 4096
 ROS_DEFAULT = Intrinsics(640, 480, 525.0, 525.0, 319.5, 239.5)
 
 
@@ -45,14 +47,18 @@ class KnownSequence:
     """A family of public sequences.
 
     Attributes:
+        name: what it is called.
         pattern: regular expression that finds the family in a folder's name.
         camera: its camera.
+        own_name: regular expression that finds it in the comments of its lists; None where they do not name it.
         camera_poses: turns its ground truth into T_world_cam; None where it is that already.
         numbered: its stamps are frame numbers, not seconds.
     """
 
+    name: str
     pattern: str
     camera: CameraSetup
+    own_name: str | None = None
     camera_poses: Callable[[FloatArray], FloatArray] | None = None
     numbered: bool = False
 
@@ -62,26 +68,39 @@ def _setup(fx: float, fy: float, cx: float, cy: float, *distortion: float) -> Ca
     return CameraSetup(Intrinsics(640, 480, fx, fy, cx, cy, (k1, k2, p1, p2, k3), KINECT_READOUT), TUM_DEPTH_SCALE)
 
 
+ICL_NUIM = KnownSequence(
+    "ICL-NUIM",
+    r"icl_?-?nuim|(?:living|office)_room_traj|traj\d_frei_png",
+    CameraSetup(Intrinsics(640, 480, 481.20, 480.0, 319.5, 239.5, readout=0.0), TUM_DEPTH_SCALE, y_up=True),
+    numbered=True,
+)
 KNOWN_SEQUENCES = (
     KnownSequence(
+        "TUM freiburg1",
         r"(?:freiburg|fr)1(?!\d)",
         _setup(517.306408, 516.469215, 318.643040, 255.313989, 0.262383, -0.953104, -0.005358, 0.002628, 1.163314),
+        r"rgbd_dataset_freiburg1",
     ),
     KnownSequence(
+        "TUM freiburg2",
         r"(?:freiburg|fr)2(?!\d)",
         _setup(520.908620, 521.007327, 325.141442, 249.701764, 0.231222, -0.784899, -0.003257, -0.000105, 0.917205),
+        r"rgbd_dataset_freiburg2",
     ),
-    KnownSequence(r"(?:freiburg|fr)3(?!\d)", _setup(535.4, 539.2, 320.1, 247.6)),
     KnownSequence(
+        "TUM freiburg3",
+        r"(?:freiburg|fr)3(?!\d)",
+        _setup(535.4, 539.2, 320.1, 247.6),
+        r"rgbd_dataset_freiburg3",
+    ),
+    KnownSequence(
+        "Bonn RGB-D Dynamic",
         r"rgbd_bonn",
         _setup(542.822841, 542.576870, 315.593520, 237.756098, 0.039903, -0.099343, -0.000730, -0.000144, 0.0),
+        r"rgbd_bonn",
         camera_poses=bonn_camera_poses,
     ),
-    KnownSequence(
-        r"icl_?-?nuim|(?:living|office)_room_traj|traj\d_frei_png",
-        CameraSetup(Intrinsics(640, 480, 481.20, 480.0, 319.5, 239.5, readout=0.0), TUM_DEPTH_SCALE, y_up=True),
-        numbered=True,
-    ),
+    ICL_NUIM,
 )
 """Sources: TUM https://cvg.cit.tum.de/data/datasets/rgbd-dataset/file_formats (calibration of the colour camera;
 the fr3 images are rectified already), Bonn as in ``bonn_camera_poses``, ICL-NUIM
@@ -91,7 +110,33 @@ of the image, and the ground truth is mirrored instead (``mirror_y``)."""
 
 
 def known_sequence(folder: Path) -> KnownSequence | None:
-    """The family that the folder's own name, or a parent named just "fr1" or "freiburg1", belongs to."""
+    """The family a folder belongs to, by its content or else by its name.
+
+    Content: ICL-NUIM's ``*.gt.freiburg``, or a data set's own name in the comments above a list (TUM and Bonn write
+    the name of the bag there). Name: the folder's own, or a parent named just "fr1" or "freiburg1".
+    """
+    return _known_by_content(folder) or _known_by_name(folder)
+
+
+def named_by_content(folder: Path) -> list[str]:
+    """A note where the content gives a family that the folder's name does not."""
+    known = _known_by_content(folder)
+    if known is None or known is _known_by_name(folder):
+        return []
+    return [f"The sequence is of {known.name}, as its files state; the camera and poses are read accordingly."]
+
+
+def _known_by_content(folder: Path) -> KnownSequence | None:
+    if icl_truth(folder):
+        return ICL_NUIM
+    comments = " ".join(_comments(folder / name) for name in LISTS).lower()
+    for known in KNOWN_SEQUENCES:
+        if known.own_name and re.search(known.own_name, comments):
+            return known
+    return None
+
+
+def _known_by_name(folder: Path) -> KnownSequence | None:
     name, parent = folder.resolve().name.lower(), folder.resolve().parent.name.lower()
     for known in KNOWN_SEQUENCES:
         if re.search(rf"(?<![a-z0-9])(?:{known.pattern})", name) or re.fullmatch(known.pattern, parent):
@@ -99,21 +144,41 @@ def known_sequence(folder: Path) -> KnownSequence | None:
     return None
 
 
-def find_camera(folder: Path, config: DatasetConfig) -> CameraSetup | None:
-    """The camera that the user, a camera.yaml in the folder or the folder's name gives, in that order.
+def icl_truth(folder: Path) -> list[Path]:
+    """ICL-NUIM's ground truth files in a folder."""
+    return sorted(file for file in folder.glob("*.gt.freiburg") if file.is_file())
 
-    The depth scale is looked for in the same order, on its own.
+
+def _comments(file: Path) -> str:
+    """The comments among the first lines of a list, or nothing where it cannot be read."""
+    if not file.is_file():
+        return ""
+    with file.open("rb") as stream:
+        lines = stream.read(COMMENT_BYTES).decode("utf-8", "replace").splitlines()
+    return " ".join(line for line in lines if line.startswith("#"))
+
+
+def find_camera(folder: Path, config: DatasetConfig) -> CameraSetup | None:
+    """The camera that the user, a camera.yaml in the folder or the known family gives, in that order.
+
+    The depth scale is looked for in the same order, on its own. Which way the ground truth's y points is said by
+    the sequence's own camera.yaml, or else by the family: a camera that the user names says nothing of poses,
+    unless its fy is negative.
 
     Raises:
         DatasetError: a camera file is not readable.
     """
     known = known_sequence(folder)
-    file = config.camera or folder / CAMERA_FILE
-    if config.camera or file.exists():
-        setup = read_camera(file)
+    own = folder / CAMERA_FILE
+    if config.camera or own.exists():
+        setup = read_camera(config.camera or own)
     elif known:
         setup = known.camera
     else:
         return None
+    if config.camera and known and known.camera.y_up:
+        turned = read_camera(own).y_up if own.exists() else known.camera.y_up
+        setup = replace(setup, y_up=setup.y_up or turned)
+    stated = config.depth_scale or (setup.depth_scale if setup.scale_stated else None)
     fallback = known.camera.depth_scale if known else None
-    return replace(setup, depth_scale=config.depth_scale or setup.depth_scale or fallback)
+    return replace(setup, depth_scale=stated or fallback, scale_stated=stated is not None)

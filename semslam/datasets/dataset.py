@@ -13,6 +13,7 @@ class Dataset(Protocol):
     """A recorded or rendered RGB-D sequence.
 
     Frames come in ascending time; frame ``index`` counts from 0 within the dataset and ``frame(i).index == i``.
+    Its ``source_index`` is the number of the image in its source, which choosing frames does not change.
     Reading is lazy: only one frame is in memory at a time.
     """
 
@@ -34,7 +35,7 @@ class Dataset(Protocol):
 
     @property
     def notes(self) -> list[str]:
-        """What was mended or left out while the lists were read, a sentence each."""
+        """What was assumed, mended or left out while the lists were read, a sentence each."""
 
     def __len__(self) -> int:
         """Number of frames."""

@@ -78,7 +78,8 @@ class FaultyDataset(ChosenFrames):
         if self._hits(self._config.nan_depth, source):
             lost = np.random.default_rng((self._config.seed, source)).random(depth.shape) < 0.5
             depth = np.where(lost, np.float32(np.nan), depth)
-        return replace(frame, index=index, timestamp=self.timestamps[index], color=color, depth=depth)
+        stamp, number = self.timestamps[index], frame.source_index  # a repeated image is still the one it was
+        return replace(frame, index=index, timestamp=stamp, color=color, depth=depth, number=number)
 
     def _hits(self, intervals: tuple[Interval, ...], source: int) -> bool:
         return any(begin <= self._elapsed[source] < end for begin, end in intervals)

@@ -4,18 +4,28 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from semslam.datasets.images import read_color, read_depth
-from semslam.errors import DatasetError
+import numpy as np
+
+from semslam.datasets.images import DepthScale, read_color, read_depth
+from semslam.errors import DatasetError, printable
 from semslam.types import Float32Array, Frame, Intrinsics, Trajectory
 
 
 @dataclass(frozen=True, slots=True)
 class ImagePair:
-    """A frame on disk: its stamp in seconds, its colour and its depth image."""
+    """A frame on disk.
+
+    Attributes:
+        timestamp: seconds.
+        color: the colour image.
+        depth: the depth image.
+        number: of the colour image in the source: in its list, or as its name says.
+    """
 
     timestamp: float
     color: Path
     depth: Path
+    number: int
 
 
 class ImageSequence:
@@ -24,10 +34,11 @@ class ImageSequence:
     Args:
         name: short name.
         intrinsics: the camera.
-        depth_scale: units of the depth images per metre.
+        depth_scale: units of the depth images per metre; where it is assumed, the first image is read, and a note
+            says what it implies.
         pairs: the frames, strictly ascending in time.
         ground_truth: T_world_cam, or None.
-        notes: what was mended while the lists were read.
+        notes: what was assumed or mended while the lists were read.
 
     Raises:
         DatasetError: there is no frame.
@@ -37,20 +48,20 @@ class ImageSequence:
         self,
         name: str,
         intrinsics: Intrinsics,
-        depth_scale: float,
+        depth_scale: DepthScale,
         pairs: Sequence[ImagePair],
         ground_truth: Trajectory | None,
         notes: Sequence[str] = (),
     ) -> None:
         if not pairs:
             raise DatasetError(f"The sequence {name} holds no frame with both a colour and a depth image.")
-        self.name = name
+        self.name = printable(name)
         self.intrinsics = intrinsics
         self.ground_truth = ground_truth
-        self.notes = list(notes)
         self.timestamps = [pair.timestamp for pair in pairs]
         self._pairs = list(pairs)
         self._depth_scale = depth_scale
+        self.notes = [printable(note) for note in (*notes, *self._assumptions())]
 
     def __len__(self) -> int:
         return len(self._pairs)
@@ -66,10 +77,23 @@ class ImageSequence:
             raise IndexError(f"Frame {index} of {len(self)}.")
         pair = self._pairs[index]
         color = read_color(pair.color, (self.intrinsics.width, self.intrinsics.height))
-        return Frame(index, pair.timestamp, color, self._read_depth(pair.depth), self.intrinsics)
+        return Frame(index, pair.timestamp, color, self._read_depth(pair.depth), self.intrinsics, pair.number)
 
     def __iter__(self) -> Iterator[Frame]:
         return (self.frame(index) for index in range(len(self)))
 
     def _read_depth(self, path: Path) -> Float32Array:
         return read_depth(path, self._depth_scale, (self.intrinsics.width, self.intrinsics.height))
+
+    def _assumptions(self) -> list[str]:
+        """What nobody stated, and what follows from it; floating-point depth is metres and needs no assumption."""
+        if not self._depth_scale.assumed:
+            return []
+        try:
+            raw = read_depth(self._pairs[0].depth, DepthScale(1.0))
+        except DatasetError:  # the frame will say so when it is its turn
+            return [self._depth_scale.describe(None)]
+        if (raw != np.rint(raw)).any():
+            return []
+        seen = raw[raw > 0] / self._depth_scale.integers
+        return [self._depth_scale.describe(float(np.median(seen)) if len(seen) else None)]

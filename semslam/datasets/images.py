@@ -1,22 +1,48 @@
-"""Reading colour and depth images strictly: a damaged file is an error, never a half-grey picture."""
+"""Reading colour, depth and label images strictly: a damaged file is an error, never a half-grey picture."""
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import cv2
 import numpy as np
 import numpy.typing as npt
+import simplejpeg
 
+from semslam.datasets.image_header import JPEG, MAX_FILE_BYTES, read_header
 from semslam.errors import DatasetError
+from semslam.files import read_bytes
 from semslam.types import Float32Array, UInt8Array
 
 AnyImage = npt.NDArray[np.integer[Any] | np.floating[Any]]
 IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".pgm", ".ppm", ".tif", ".tiff", ".bmp")
+DISTANT = 1e4
+"""Metres; a depth image of floating-point values beyond this holds none there."""
 
-_PNG_START, _PNG_END = b"\x89PNG\r\n\x1a\n", b"IEND\xaeB`\x82"
-_JPEG_START, _JPEG_END = b"\xff\xd8\xff", b"\xff\xd9"
 # An EXIF orientation is ignored: depth images carry none, and the two must stay aligned.
-_COLOR_FLAGS = cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION
+_COLOR_FLAGS = cv2.IMREAD_COLOR_RGB | cv2.IMREAD_IGNORE_ORIENTATION
+
+
+@dataclass(frozen=True, slots=True)
+class DepthScale:
+    """Units per metre of depth images.
+
+    Attributes:
+        integers: of images of whole numbers.
+        floats: of images of floating-point numbers, which are metres unless something else is stated.
+        assumed: whether nobody states the scale of whole numbers, so that it has to be said what it implies.
+    """
+
+    integers: float
+    floats: float = 1.0
+    assumed: bool = False
+
+    def describe(self, median: float | None) -> str:
+        """A sentence on an assumed scale and the median depth in metres of the first image."""
+        implied = "" if median is None else f", by which the median depth of the first image is {median:.2f} m"
+        return (
+            f"No depth scale is stated: {self.integers:g} units per metre are assumed{implied} (dataset.depth_scale)."
+        )
 
 
 def read_color(path: Path, size: tuple[int, int] | None = None) -> UInt8Array:
@@ -29,66 +55,119 @@ def read_color(path: Path, size: tuple[int, int] | None = None) -> UInt8Array:
     Raises:
         DatasetError: the file is missing, damaged, no image or of another size.
     """
-    bgr = _decode(path, _COLOR_FLAGS, size)
-    return np.asarray(cv2.cvtColor(bgr, cv2.COLOR_BGR2RGB), dtype=np.uint8)
+    return decode_color(_content(path), f"The image {path}", size)
+
+
+def decode_color(data: bytes, name: str, size: tuple[int, int] | None = None) -> UInt8Array:
+    """Decode the content of a colour (or grey) image file as (H, W, 3) uint8 RGB.
+
+    A JPEG of which the decoder has anything to complain about counts as damaged.
+
+    Args:
+        data: the file's content.
+        name: for the message, such as "The image a.png".
+        size: (width, height) it must have, if given.
+
+    Raises:
+        DatasetError: the image is damaged, none at all or of another size.
+    """
+    header = read_header(data, name)
+    check_size((header.width, header.height), size, name)
+    if header.kind != JPEG:
+        return np.asarray(_decode(data, _COLOR_FLAGS, name), dtype=np.uint8)
+    try:
+        return np.asarray(simplejpeg.decode_jpeg(data, "RGB", strict=True), dtype=np.uint8)
+    except ValueError as error:
+        raise DatasetError(f"{name} is damaged: {str(error).rstrip('.')}.") from error
 
 
 def read_depth(
-    path: Path, scale: float, size: tuple[int, int] | None = None, missing: int | None = None
+    path: Path, scale: DepthScale, size: tuple[int, int] | None = None, missing: int | None = None
 ) -> Float32Array:
     """Read a depth image as (H, W) float32 metres with 0 where there is none.
 
     Args:
-        path: the image file: one channel of 16-bit or floating-point figures.
+        path: the image file: one channel of 16-bit or floating-point values.
         scale: units per metre.
         size: (width, height) it must have, if given.
-        missing: a raw figure that stands for "none" besides 0.
+        missing: a raw value that stands for "none" besides 0.
 
     Raises:
         DatasetError: the file is missing, damaged, no image, of another size, or no depth image.
     """
-    raw = _decode(path, cv2.IMREAD_UNCHANGED, size)
+    return decode_depth(_content(path), f"The depth image {path}", scale, size, missing)
+
+
+def decode_depth(
+    data: bytes, name: str, scale: DepthScale, size: tuple[int, int] | None = None, missing: int | None = None
+) -> Float32Array:
+    """Decode the content of a depth image file; see ``read_depth``.
+
+    Raises:
+        DatasetError: the image is damaged, none at all, of another size, or no depth image.
+    """
+    header = read_header(data, name)
+    check_size((header.width, header.height), size, name)
+    raw = _decode(data, cv2.IMREAD_UNCHANGED, name)
     if raw.ndim != 2:
-        raise DatasetError(f"The depth image {path} has {raw.shape[2]} channels; depth has one.")
+        raise DatasetError(f"{name} has {raw.shape[2]} channels; depth has one.")
     if raw.dtype != np.uint16 and not np.issubdtype(raw.dtype, np.floating):
-        raise DatasetError(f"The depth image {path} holds {raw.dtype} figures; depth needs 16 bits.")
-    depth = raw.astype(np.float32)
-    depth /= np.float32(scale)
+        raise DatasetError(f"{name} holds {raw.dtype} values; depth needs 16 bits.")
+    depth = to_metres(raw, scale)
     if missing is not None:
         depth[raw == missing] = 0.0
-    if raw.dtype != np.uint16:
-        depth[~(np.isfinite(depth) & (depth > 0))] = 0.0
     return depth
 
 
-def check_size(image: AnyImage, size: tuple[int, int], path: Path | str) -> None:
-    """Raise a DatasetError unless an image (H, W, ...) is ``size`` = (width, height) pixels."""
-    height, width = image.shape[:2]
-    if (width, height) != size:
-        raise DatasetError(f"The image {path} is {width}x{height} pixels; the camera has {size[0]}x{size[1]}.")
+def to_metres(raw: AnyImage, scale: DepthScale) -> Float32Array:
+    """Raw depth (H, W) as float32 metres, 0 where there is none."""
+    whole = np.issubdtype(raw.dtype, np.integer)
+    with np.errstate(over="ignore"):
+        depth = raw.astype(np.float32)
+        depth /= np.float32(scale.integers if whole else scale.floats)
+    if not whole:
+        depth[~(np.isfinite(depth) & (depth > 0) & (depth < DISTANT))] = 0.0
+    return depth
 
 
-def _decode(path: Path, flags: int, size: tuple[int, int] | None) -> AnyImage:
+def read_labels(path: Path, size: tuple[int, int] | None = None, classes: int = 256) -> UInt8Array:
+    """Read a label image, one channel of 8 or 16 bits, as (H, W) uint8.
+
+    Args:
+        path: the image file.
+        size: (width, height) it must have, if given.
+        classes: labels must lie below this.
+
+    Raises:
+        DatasetError: the file is missing, damaged, no label image, of another size, or a label is not known.
+    """
+    name = f"The label image {path}"
+    data = _content(path, "The label image")
+    header = read_header(data, name)
+    check_size((header.width, header.height), size, name)
+    labels = _decode(data, cv2.IMREAD_UNCHANGED, name)
+    if labels.ndim != 2 or not np.issubdtype(labels.dtype, np.unsignedinteger):
+        raise DatasetError(f"{name} is not one channel of whole numbers.")
+    if (largest := int(labels.max(initial=0))) >= min(classes, 256):
+        raise DatasetError(f"{name} holds the label {largest}, beyond the {classes} classes.")
+    return labels.astype(np.uint8)
+
+
+def check_size(found: tuple[int, int], wanted: tuple[int, int] | None, name: str) -> None:
+    """Raise a DatasetError unless an image has the ``wanted`` (width, height), if there is one."""
+    if wanted is not None and found != wanted:
+        raise DatasetError(f"{name} is {found[0]}x{found[1]} pixels; the camera has {wanted[0]}x{wanted[1]}.")
+
+
+def _content(path: Path, what: str = "The image") -> bytes:
+    return read_bytes(path, what, DatasetError, MAX_FILE_BYTES)
+
+
+def _decode(data: bytes, flags: int, name: str) -> AnyImage:
     try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise DatasetError(f"The image {path} cannot be read: {error.strerror}.") from error
-    if not data:
-        raise DatasetError(f"The image {path} is empty.")
-    if _is_cut_off(data):
-        raise DatasetError(f"The image {path} is cut off: its end is missing.")
-    image = cv2.imdecode(np.frombuffer(data, np.uint8), flags)
+        image = cv2.imdecode(np.frombuffer(data, np.uint8), flags)
+    except cv2.error as error:  # OpenCV's own limits
+        raise DatasetError(f"{name} cannot be decoded: {error.err}.") from error
     if image is None:
-        raise DatasetError(f"The image {path} cannot be decoded: it is damaged or no image.")
-    if size is not None:
-        check_size(image, size, path)
+        raise DatasetError(f"{name} cannot be decoded: it is damaged or no image.")
     return image
-
-
-def _is_cut_off(data: bytes) -> bool:
-    """Whether a PNG or JPEG lacks its end marker; some decoders return such a file half grey, without an error."""
-    if data.startswith(_PNG_START):
-        return data.rfind(_PNG_END) < 0
-    if data.startswith(_JPEG_START):
-        return not data.rstrip(b"\0").endswith(_JPEG_END)
-    return False

@@ -5,6 +5,7 @@ from typing import Any
 import cv2
 import numpy as np
 
+from semslam.datasets.images import DepthScale, decode_color, decode_depth, to_metres
 from semslam.errors import ConfigError, DatasetError
 from semslam.geometry.camera import NO_DISTORTION, Intrinsics
 from semslam.types import Float32Array, UInt8Array
@@ -17,6 +18,11 @@ _TO_RGB = {
     "mono8": (1, cv2.COLOR_GRAY2RGB),
     "8UC3": (3, cv2.COLOR_BGR2RGB),
 }
+
+
+COMPRESSED_DEPTH = "compressedDepth"
+_DEPTH_HEADER = 12
+"""Bytes before the PNG of image_transport's compressedDepth: a format and two quantisation parameters."""
 
 
 def to_intrinsics(info: Any, topic: str) -> Intrinsics:
@@ -35,10 +41,17 @@ def to_intrinsics(info: Any, topic: str) -> Intrinsics:
         raise DatasetError(f"The CameraInfo of {topic} is not usable: {error}") from error
 
 
+def holds_floats(message: Any) -> bool:
+    """Whether a depth message holds floating-point metres."""
+    return str(getattr(message, "encoding", "")).startswith("32F")
+
+
 def _pixels(message: Any, dtype: np.dtype[Any], channels: int) -> Any:
     """The image (H, W, channels) of a raw message, whose rows may be padded."""
     row = message.width * channels * dtype.itemsize
     data = np.frombuffer(message.data, np.uint8)
+    if min(message.width, message.height) < 1:
+        raise DatasetError("An image message has no pixels.")
     if message.step < row or data.size < message.step * message.height:
         raise DatasetError(f"An image message of {message.width}x{message.height} pixels is cut off.")
     rows = data[: message.step * message.height].reshape(message.height, message.step)[:, :row]
@@ -53,10 +66,7 @@ def to_color(message: Any, topic: str) -> UInt8Array:
         DatasetError: the encoding is not known, or the message is damaged.
     """
     if not hasattr(message, "encoding"):
-        bgr = cv2.imdecode(np.frombuffer(message.data, np.uint8), cv2.IMREAD_COLOR)
-        if bgr is None:
-            raise DatasetError(f"A compressed image of {topic} is damaged.")
-        return np.asarray(cv2.cvtColor(bgr, cv2.COLOR_BGR2RGB), dtype=np.uint8)
+        return decode_color(bytes(message.data), f"A compressed image of {topic}")
     if message.encoding not in _TO_RGB:
         raise DatasetError(f"The images of {topic} are in the encoding '{message.encoding}', which is not known.")
     channels, conversion = _TO_RGB[message.encoding]
@@ -64,22 +74,30 @@ def to_color(message: Any, topic: str) -> UInt8Array:
     return np.asarray(image.copy() if conversion is None else cv2.cvtColor(image, conversion), dtype=np.uint8)
 
 
-def to_depth(message: Any, topic: str, scale: float) -> Float32Array:
-    """A sensor_msgs Image as depth (H, W) float32 metres, 0 where there is none.
+def to_depth(message: Any, topic: str, scale: DepthScale) -> Float32Array:
+    """A sensor_msgs Image, or a CompressedImage of 16 bits, as depth (H, W) float32 metres, 0 where there is none.
 
     Args:
         message: 32FC1 in metres, or 16UC1 in units.
         topic: for the error message.
-        scale: units per metre of 16UC1.
+        scale: units per metre.
 
     Raises:
         DatasetError: the encoding is another one, or the message is cut off.
     """
+    if not hasattr(message, "encoding"):
+        return _compressed_depth(message, topic, scale)
     if message.encoding in ("16UC1", "mono16"):
-        depth = _pixels(message, np.dtype(np.uint16), 1)[..., 0].astype(np.float32) / np.float32(scale)
-    elif message.encoding == "32FC1":
-        depth = _pixels(message, np.dtype(np.float32), 1)[..., 0].astype(np.float32)
-    else:
-        raise DatasetError(f"The depth images of {topic} are in the encoding '{message.encoding}', not 16UC1 or 32FC1.")
-    depth[~(np.isfinite(depth) & (depth > 0))] = 0.0
-    return np.asarray(depth, dtype=np.float32)
+        return to_metres(_pixels(message, np.dtype(np.uint16), 1)[..., 0], scale)
+    if message.encoding == "32FC1":
+        return to_metres(_pixels(message, np.dtype(np.float32), 1)[..., 0], scale)
+    raise DatasetError(f"The depth images of {topic} are in the encoding '{message.encoding}', not 16UC1 or 32FC1.")
+
+
+def _compressed_depth(message: Any, topic: str, scale: DepthScale) -> Float32Array:
+    data, name = bytes(message.data), f"A compressed depth image of {topic}"
+    if COMPRESSED_DEPTH in message.format:
+        if not message.format.startswith(("16UC1", "mono16")):
+            raise DatasetError(f"{name} is in the format '{message.format}', not 16UC1.")
+        data = data[_DEPTH_HEADER:]
+    return decode_depth(data, name, scale)

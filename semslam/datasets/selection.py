@@ -9,7 +9,7 @@ from semslam.types import Frame, Intrinsics, Trajectory
 
 
 class ChosenFrames:
-    """Frames of another dataset, numbered from 0 again.
+    """Frames of another dataset, numbered from 0 again; each keeps its number in the source.
 
     Args:
         dataset: the whole sequence.
@@ -51,7 +51,8 @@ class ChosenFrames:
             DatasetError: an image is not readable.
             IndexError: there is no such frame.
         """
-        return replace(self._dataset.frame(self._source(index)), index=index)
+        frame = self._dataset.frame(self._source(index))
+        return replace(frame, index=index, number=frame.source_index)
 
     def __iter__(self) -> Iterator[Frame]:
         return (self.frame(index) for index in range(len(self)))

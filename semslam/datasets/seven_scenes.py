@@ -1,5 +1,6 @@
 """Microsoft 7-Scenes in its own layout."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import ClassVar, Self
 
@@ -12,6 +13,7 @@ from semslam.datasets.image_sequence import ImagePair, ImageSequence
 from semslam.datasets.images import read_depth
 from semslam.datasets.registration import register_depth
 from semslam.errors import DatasetError
+from semslam.files import read_text
 from semslam.geometry.camera import Intrinsics
 from semslam.geometry.se3 import FloatArray, invert, is_rigid, make_transform, orthonormalise
 from semslam.types import Float32Array, Trajectory
@@ -21,6 +23,7 @@ DEPTH_CAMERA = Intrinsics(640, 480, 585.0, 585.0, 320.0, 240.0)
 MILLIMETRES = 1000.0
 NO_DEPTH = 65535
 RIGID_TOLERANCE = 0.01
+MAX_POSE_BYTES = 100_000
 
 T_COLOR_DEPTH = make_transform(
     [
@@ -45,6 +48,7 @@ class SevenScenesDataset(ImageSequence):
     """
 
     layout: ClassVar[str] = "frame-000000.color.png or seq-01/ (7-Scenes)"
+    reads: ClassVar[tuple[str, ...]] = ("camera", "depth_scale", "fps", "register_depth")
     _register = False
 
     @classmethod
@@ -61,15 +65,17 @@ class SevenScenesDataset(ImageSequence):
         """
         folder = _sequence_folder(Path(path))
         notes: list[str] = []
-        setup = find_camera(folder, config) or CameraSetup(COLOR_CAMERA, config.depth_scale)
+        stated = config.depth_scale
+        setup = find_camera(folder, config) or CameraSetup(COLOR_CAMERA, stated, scale_stated=stated is not None)
         color = sorted(folder.glob("frame-*.color.png"))
         numbers = [_number(file) for file in color]
         stamps = [number / config.fps for number in numbers]
         depth = [file.with_name(file.name.replace(".color.", ".depth.")) for file in color]
-        pairs = [ImagePair(*row) for row in zip(stamps, color, depth, strict=True)]
+        pairs = [ImagePair(*row) for row in zip(stamps, color, depth, numbers, strict=True)]
         truth = _read_poses(stamps, color, config.register_depth, notes)
         name = f"{folder.resolve().parent.name}-{folder.resolve().name}"
-        dataset = cls(name, setup.intrinsics, setup.depth_scale or MILLIMETRES, pairs, truth, notes)
+        scale = replace(setup.depth(MILLIMETRES), assumed=False)  # the data set's own convention
+        dataset = cls(name, setup.intrinsics, scale, pairs, truth, notes)
         dataset._register = config.register_depth
         return dataset
 
@@ -95,7 +101,7 @@ def _sequence_folder(path: Path) -> Path:
 
 def _number(file: Path) -> int:
     text = file.name.removeprefix("frame-").removesuffix(".color.png")
-    if not text.isdigit():
+    if not (text.isdecimal() and len(text) <= 15):
         raise DatasetError(f"The name of {file} has no frame number.")
     return int(text)
 
@@ -118,7 +124,8 @@ def _read_poses(stamps: list[float], color: list[Path], register: bool, notes: l
 
 def _read_pose(file: Path) -> FloatArray | None:
     try:
-        pose = np.array(file.read_text(encoding="utf-8").split(), dtype=np.float64).reshape(4, 4)
-    except (OSError, ValueError):
+        words = read_text(file, "The pose", DatasetError, MAX_POSE_BYTES).split()
+        pose = np.array(words, dtype=np.float64).reshape(4, 4)
+    except (DatasetError, ValueError):
         return None
     return pose if is_rigid(pose, RIGID_TOLERANCE) else None

@@ -15,6 +15,13 @@ PixelT = TypeVar("PixelT", np.uint8, np.uint16, np.float32)
 
 NO_DISTORTION = (0.0, 0.0, 0.0, 0.0, 0.0)
 
+# Beyond these no camera lies; what is merely unusual is for ``semslam.datasets.plausibility`` to remark on.
+MAX_SIDE = 2**15
+MIN_FOCAL, MAX_FOCAL, MAX_OFFSET = 0.01, 100.0, 5.0
+"""Of the longer side of the image."""
+MAX_DISTORTION = 1000.0
+MAX_READOUT = 10.0
+
 
 @dataclass(frozen=True, slots=True)
 class Intrinsics:
@@ -32,7 +39,8 @@ class Intrinsics:
             once, None = not known.
 
     Raises:
-        ConfigError: a size or focal length is not positive, the read-out is negative, or a figure is not finite.
+        ConfigError: a size or focal length is not positive, the read-out is negative, or a value is not finite or
+            so far off that no camera has it.
     """
 
     width: int
@@ -46,10 +54,24 @@ class Intrinsics:
 
     def __post_init__(self) -> None:
         readout = 0.0 if self.readout is None else self.readout
-        figures = (self.fx, self.fy, self.cx, self.cy, *self.distortion, readout)
-        positive = min(self.width, self.height, self.fx, self.fy) > 0 and readout >= 0
-        if not np.isfinite(figures).all() or not positive:
+        values = (self.width, self.height, self.fx, self.fy, self.cx, self.cy, readout, *self.distortion)
+        if len(self.distortion) != 5 or not all(isinstance(value, int | float | np.number) for value in values):
             raise ConfigError(f"These camera intrinsics are not usable: {self}.")
+        numbers = (self.fx, self.fy, self.cx, self.cy, *self.distortion, readout)
+        positive = min(self.width, self.height, self.fx, self.fy) > 0 and readout >= 0
+        if not np.isfinite(numbers).all() or not positive:
+            raise ConfigError(f"These camera intrinsics are not usable: {self}.")
+        side = max(self.width, self.height)
+        absurd = {
+            "size": side > MAX_SIDE,
+            "focal length": not all(MIN_FOCAL * side <= f <= MAX_FOCAL * side for f in (self.fx, self.fy)),
+            "principal point": max(abs(self.cx), abs(self.cy)) > MAX_OFFSET * side,
+            "distortion": max(map(abs, self.distortion)) > MAX_DISTORTION,
+            "read-out": readout > MAX_READOUT,
+        }
+        for what, far_off in absurd.items():
+            if far_off:
+                raise ConfigError(f"No camera has this {what}: {self}.")
 
     @property
     def matrix(self) -> FloatArray:

@@ -9,8 +9,10 @@ from functools import partial
 
 from semslam.config import Config
 from semslam.datasets.dataset import Dataset
+from semslam.datasets.plausibility import check_plausibility
 from semslam.datasets.prefetch import prefetch
 from semslam.errors import DatasetError
+from semslam.eval.trajectory import coverage_remark
 from semslam.loop.verification.verifier import LoopVerifier
 from semslam.runs.metrics import Metrics, TimeMetrics
 from semslam.runs.recording import RecordedFrame, Recording, checksum
@@ -173,8 +175,14 @@ class _Session:
                 self._interrupted,
                 self._checksum,
             ),
-            notes=(*self._dataset.notes, *self._unreadable, *slam.notes),
+            notes=(*self._doubts(slam, scores.metrics), *self._dataset.notes, *self._unreadable, *slam.notes),
         )
+
+    def _doubts(self, slam: SlamResult, metrics: Metrics) -> list[str]:
+        """What looks wrong with the sequence, and with a score that stands for few of its frames."""
+        found = check_plausibility(self._dataset, [state.index for state in slam.frames])
+        remark = coverage_remark(metrics.optimized.pairs, metrics.frames)
+        return [*(doubt.sentence for doubt in found), *([] if remark is None else [remark])]
 
 
 def _worker(config: Config, frames: int) -> WorkerKind:

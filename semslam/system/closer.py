@@ -13,8 +13,9 @@ from semslam.backend.graph.factors import between_factor, read_edges
 from semslam.backend.graph.products import Edge, loop_edge
 from semslam.backend.pose_graph import PoseGraph
 from semslam.config import Config
-from semslam.errors import DatasetError, GraphError
+from semslam.errors import DatasetError, GraphError, shortened
 from semslam.frontend.keyframes import KeyframeBuilder
+from semslam.geometry.poses import PoseLike
 from semslam.geometry.se3 import FloatArray, adjoint, invert
 from semslam.loop.detector import LoopDetector
 from semslam.loop.search import LoopSearch
@@ -75,7 +76,7 @@ class LoopCloser:
         detector: str | LoopDetector | None = None,
         config: Config | None = None,
         *,
-        T_body_cam: npt.ArrayLike | None = None,
+        T_body_cam: PoseLike | None = None,
         noise: Noise | None = None,
         kernel: gtsam.noiseModel.mEstimator.Base | None = None,
         verifier: LoopVerifier | None = None,
@@ -103,7 +104,7 @@ class LoopCloser:
         key: int,
         color: npt.NDArray[np.uint8],
         depth: npt.NDArray[np.floating],
-        T_world_cam: npt.ArrayLike | None = None,
+        T_world_cam: PoseLike | None = None,
         timestamp: float | None = None,
         labels: LabelMap | None = None,
     ) -> list[gtsam.BetweenFactorPose3]:
@@ -115,7 +116,7 @@ class LoopCloser:
             key: the caller's key of the pose, such as ``gtsam.symbol("x", 7)``.
             color: (H, W, 3) uint8 RGB.
             depth: (H, W) metres, registered to colour; 0 = none.
-            T_world_cam: (4, 4) the current estimate of the camera's pose, where there is one.
+            T_world_cam: (4, 4) or a ``gtsam.Pose3``: the current estimate of the camera's pose, where there is one.
             timestamp: seconds, ascending; none = ``keyframes.interval`` after the keyframe before.
             labels: a segmentation, where the caller has one already.
 
@@ -211,14 +212,19 @@ class LoopCloser:
         return Edge(match_key, query_key, T_match_query, carry @ seen.covariance @ carry.T)
 
     def _check(self, key: int, timestamp: float) -> None:
+        if not isinstance(key, int | np.integer):
+            raise GraphError(f"A key is a whole number such as gtsam.symbol('x', 7), not {shortened(repr(key))}.")
         if key in self._keys:
             raise GraphError(f"The key {key} was added before.")
         before = self._last_timestamp
+        if not isinstance(timestamp, int | float | np.number):
+            raise GraphError(f"A stamp is a number of seconds, not {shortened(repr(timestamp))}.")
         if not np.isfinite(timestamp) or (before is not None and timestamp <= before):
             raise GraphError(f"The stamp {timestamp} does not lie after the keyframe before.")
 
     def _frame(self, color: npt.NDArray[np.uint8], depth: npt.NDArray[np.floating], timestamp: float) -> Frame:
         size = (self._intrinsics.height, self._intrinsics.width)
+        color, depth = np.asarray(color), np.asarray(depth)
         if color.shape != (*size, 3) or color.dtype != np.uint8:
             raise DatasetError(f"A colour image must be {(*size, 3)} uint8, not {color.shape} {color.dtype}.")
         if depth.shape != size or not np.issubdtype(depth.dtype, np.floating):

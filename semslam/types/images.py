@@ -11,11 +11,12 @@ class Frame:
     """One RGB-D image of a sequence.
 
     Attributes:
-        index: position in the sequence, from 0.
+        index: position among the frames that are read, from 0.
         timestamp: seconds.
         color: (H, W, 3) uint8 RGB, raw (distorted) pixels.
         depth: (H, W) float32 metres along the optical axis, registered to colour; 0 = none.
         intrinsics: the camera.
+        number: number of the colour image in its source, whichever frames are read; None = the index.
     """
 
     index: int
@@ -23,6 +24,12 @@ class Frame:
     color: UInt8Array
     depth: Float32Array
     intrinsics: Intrinsics
+    number: int | None = None
+
+    @property
+    def source_index(self) -> int:
+        """Number in the source, by which whatever belongs to the image (such as its labels) is looked up."""
+        return self.index if self.number is None else self.number
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,10 +1,12 @@
 """Poses over time."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from semslam.errors import TrajectoryError
+from semslam.geometry.poses import pose_matrix
 from semslam.geometry.se3 import is_rigid
 from semslam.types.arrays import FloatArray
 
@@ -15,7 +17,7 @@ class Trajectory:
 
     Attributes:
         timestamps: (N,) seconds, strictly ascending.
-        poses: (N, 4, 4) T_world_cam.
+        poses: (N, 4, 4) T_world_cam; given as an array or as a sequence of poses, such as of ``gtsam.Pose3``.
 
     Raises:
         TrajectoryError: shapes differ, a figure is not finite, stamps do not ascend, a rotation is not orthonormal.
@@ -25,6 +27,14 @@ class Trajectory:
     poses: FloatArray
 
     def __post_init__(self) -> None:
+        try:
+            object.__setattr__(self, "timestamps", np.asarray(self.timestamps, dtype=np.float64))
+            given: Any = self.poses
+            if not isinstance(given, np.ndarray):
+                poses = [pose_matrix(pose) for pose in given]
+                object.__setattr__(self, "poses", np.array(poses).reshape(-1, 4, 4))
+        except (TypeError, ValueError, OverflowError) as error:
+            raise TrajectoryError("A trajectory needs an array of stamps and one of poses (4, 4).") from error
         if self.timestamps.ndim != 1 or self.poses.shape != (len(self.timestamps), 4, 4):
             raise TrajectoryError(f"{self.timestamps.shape} stamps do not go with poses {self.poses.shape}.")
         if not np.isfinite(self.timestamps).all() or (np.diff(self.timestamps) <= 0).any():

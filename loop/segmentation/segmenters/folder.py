@@ -7,21 +7,25 @@ import cv2
 import numpy as np
 
 from semslam.config import Config
+from semslam.datasets.images import read_labels
 from semslam.errors import ConfigError, DatasetError
+from semslam.files import read_text
 from semslam.loop.segmentation.classes import NYU40_NAMES
 from semslam.loop.segmentation.photos import UInt8Array
 from semslam.types import LabelMap
 
 NAMES_FILE = "classes.txt"
+MAX_CLASSES = 256
+MAX_NAMES_BYTES = 1_000_000
 
 
 class FolderSegmenter:
     """Reads the label image of each frame.
 
     The folder holds one single-channel PNG per frame with values into the class list. A file whose stem is the
-    frame's index (``12.png``, ``000012.png``) is taken for it; where no stem is a plain number, files are taken in
-    the order of their names (time stamps). ``classes.txt`` may name the classes, one a line from void on; without
-    it they are NYUv2's 40.
+    number of the frame in its source (``12.png``, ``000012.png``) is taken for it, whichever frames are read; where
+    no stem is a plain number, files are taken in the order of their names (time stamps). ``classes.txt`` may name
+    the classes, one a line from void on; without it they are NYUv2's 40.
 
     Args:
         folder: where the images are.
@@ -63,20 +67,19 @@ class FolderSegmenter:
         if frame_index is None or frame_index not in self._paths:
             raise DatasetError(f"There is no label image for frame {frame_index} in {self._folder}.")
         path = self._paths[frame_index]
-        labels = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
-        if labels is None or labels.ndim != 2:
-            raise DatasetError(f"The label image {path} is damaged or has more than one channel.")
-        if labels.max(initial=0) >= len(self.names):
-            raise DatasetError(f"The label image {path} holds a label beyond the {len(self.names)} class names.")
+        labels = read_labels(path, classes=len(self.names))
         size = (color.shape[1], color.shape[0])
-        full = cv2.resize(labels.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST)
+        full = cv2.resize(labels, size, interpolation=cv2.INTER_NEAREST)
         return LabelMap(np.asarray(full, dtype=np.uint8), self.names)
 
 
 def _read_names(path: Path) -> tuple[str, ...]:
     if not path.is_file():
         return NYU40_NAMES
-    names = tuple(line.strip() for line in path.read_text(encoding="utf-8").splitlines() if line.strip())
+    text = read_text(path, "The class list", DatasetError, MAX_NAMES_BYTES)
+    names = tuple(line.strip() for line in text.splitlines() if line.strip())
     if not names or names[0] != "void":
         raise DatasetError(f"The class list {path} must begin with 'void'.")
+    if len(names) > MAX_CLASSES:
+        raise DatasetError(f"The class list {path} has {len(names)} names; labels go up to {MAX_CLASSES - 1}.")
     return names

@@ -13,10 +13,11 @@ import numpy as np
 import numpy.typing as npt
 import onnxruntime
 
+from semslam.datasets.images import read_color
 from semslam.errors import DatasetError
 from semslam.geometry.se3 import Float32Array
 from semslam.loop.segmentation.decoding import shrink
-from semslam.loop.segmentation.photos import UInt8Array, read_color
+from semslam.loop.segmentation.photos import UInt8Array
 from semslam.loop.segmentation.segmenters.onnx import open_session
 
 TEACHER_SIZES = ((320, 240), (448, 336))

@@ -77,6 +77,7 @@ class SyntheticDataset:
     """
 
     layout: ClassVar[str] = "synthetic:SCENE"
+    reads: ClassVar[tuple[str, ...]] = ()
 
     def __init__(self, scene: str, request: Request) -> None:
         if scene not in PLANS:

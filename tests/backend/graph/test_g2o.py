@@ -138,7 +138,7 @@ def test_toro_edges_are_translation_first(tmp_path):
         ("", "no 3-D pose graph"),
         ("hello world\n", "no 3-D pose graph"),
         ("VERTEX_SE2 0 0 0 0\n", "2-D"),
-        ("VERTEX_SE3:QUAT 0 0 0 0 0 0 0\n", "Line 1 .* 7 figures"),
+        ("VERTEX_SE3:QUAT 0 0 0 0 0 0 0\n", "Line 1 .* 7 words"),
         ("VERTEX_SE3:QUAT 0 0 0 x 0 0 0 1\n", "not a number"),
         ("VERTEX_SE3:QUAT 0.5 0 0 0 0 0 0 1\n", "whole number"),
         ("VERTEX_SE3:QUAT 0 nan 0 0 0 0 0 1\n", "not finite"),

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from semslam.datasets.images import read_color, read_depth
+from semslam.datasets.images import DepthScale, read_color, read_depth
 from semslam.errors import DatasetError
 
 RNG = np.random.default_rng(0)
@@ -26,7 +26,7 @@ def test_grey_becomes_three_channels(tmp_path: Path) -> None:
 
 def test_depth_is_metres(tmp_path: Path) -> None:
     cv2.imwrite(str(tmp_path / "d.png"), DEPTH)
-    depth = read_depth(tmp_path / "d.png", 5000.0)
+    depth = read_depth(tmp_path / "d.png", DepthScale(5000.0))
     assert depth.dtype == np.float32
     assert np.allclose(depth, DEPTH / 5000.0, rtol=1e-6)
 
@@ -35,7 +35,7 @@ def test_a_figure_can_stand_for_no_depth(tmp_path: Path) -> None:
     raw = np.full((4, 4), 1000, np.uint16)
     raw[0] = 65535
     cv2.imwrite(str(tmp_path / "d.png"), raw)
-    depth = read_depth(tmp_path / "d.png", 1000.0, missing=65535)
+    depth = read_depth(tmp_path / "d.png", DepthScale(1000.0), missing=65535)
     assert depth[0].tolist() == [0] * 4
     assert depth[1].tolist() == [1] * 4
 
@@ -44,7 +44,7 @@ def test_floating_depth_loses_what_is_not_finite(tmp_path: Path) -> None:
     raw = np.full((4, 4), 2.5, np.float32)
     raw[0], raw[1], raw[2] = np.nan, np.inf, -1.0
     cv2.imwrite(str(tmp_path / "d.tiff"), raw)
-    assert read_depth(tmp_path / "d.tiff", 1.0)[:, 0].tolist() == [0, 0, 0, 2.5]
+    assert read_depth(tmp_path / "d.tiff", DepthScale(1.0))[:, 0].tolist() == [0, 0, 0, 2.5]
 
 
 @pytest.mark.parametrize("suffix", [".png", ".jpg"])
@@ -77,7 +77,7 @@ def test_what_is_no_image_is_refused(tmp_path: Path, content: bytes | None, reas
     file = tmp_path / "x.png"
     if content is not None:
         file.write_bytes(content)
-    for read in (read_color, lambda path: read_depth(path, 1000.0)):
+    for read in (read_color, lambda path: read_depth(path, DepthScale(1000.0))):
         with pytest.raises(DatasetError, match=reason) as caught:
             read(file)
         assert str(file) in str(caught.value)
@@ -89,13 +89,13 @@ def test_the_wrong_size_is_refused(tmp_path: Path) -> None:
     with pytest.raises(DatasetError, match=r"c\.png is 40x30 pixels; the camera has 64x48"):
         read_color(tmp_path / "c.png", (64, 48))
     with pytest.raises(DatasetError, match=r"d\.png is 40x30"):
-        read_depth(tmp_path / "d.png", 1000.0, (64, 48))
+        read_depth(tmp_path / "d.png", DepthScale(1000.0), (64, 48))
 
 
 def test_depth_of_8_bits_or_three_channels_is_refused(tmp_path: Path) -> None:
     cv2.imwrite(str(tmp_path / "8.png"), COLOR[..., 0])
     cv2.imwrite(str(tmp_path / "rgb.png"), COLOR)
     with pytest.raises(DatasetError, match="16 bits"):
-        read_depth(tmp_path / "8.png", 1000.0)
+        read_depth(tmp_path / "8.png", DepthScale(1000.0))
     with pytest.raises(DatasetError, match="3 channels"):
-        read_depth(tmp_path / "rgb.png", 1000.0)
+        read_depth(tmp_path / "rgb.png", DepthScale(1000.0))

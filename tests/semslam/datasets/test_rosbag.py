@@ -8,6 +8,7 @@ import pytest
 
 from semslam.config import DatasetConfig
 from semslam.datasets import open_dataset
+from semslam.datasets.images import DepthScale
 from semslam.datasets.ros_messages import to_color, to_depth, to_intrinsics
 from semslam.errors import DatasetError
 
@@ -83,9 +84,9 @@ def test_colour_encodings(encoding: str, pixel: list[int], padding: int) -> None
 def test_depth_encodings() -> None:
     millimetres = np.full((4, 6), 1500, np.uint16)
     metres = np.array([[1.5, np.nan, np.inf, -1.0]], np.float32)
-    assert to_depth(image_message("16UC1", millimetres), "/d", 1000.0).max() == 1.5
-    assert to_depth(image_message("16UC1", millimetres.astype(">u2"), big=True), "/d", 1000.0).max() == 1.5
-    assert to_depth(image_message("32FC1", metres), "/d", 1000.0).tolist() == [[1.5, 0, 0, 0]]
+    assert to_depth(image_message("16UC1", millimetres), "/d", DepthScale(1000.0)).max() == 1.5
+    assert to_depth(image_message("16UC1", millimetres.astype(">u2"), big=True), "/d", DepthScale(1000.0)).max() == 1.5
+    assert to_depth(image_message("32FC1", metres), "/d", DepthScale(1000.0)).tolist() == [[1.5, 0, 0, 0]]
 
 
 def test_what_cannot_be_read_is_refused() -> None:
@@ -93,12 +94,12 @@ def test_what_cannot_be_read_is_refused() -> None:
     with pytest.raises(DatasetError, match="encoding 'bayer_rggb8'"):
         to_color(image_message("bayer_rggb8", image), "/c")
     with pytest.raises(DatasetError, match="not 16UC1 or 32FC1"):
-        to_depth(image_message("8UC1", image), "/d", 1000.0)
+        to_depth(image_message("8UC1", image), "/d", DepthScale(1000.0))
     message = image_message("rgb8", image)
     message.data = message.data[:-1]
     with pytest.raises(DatasetError, match="6x4 pixels is cut off"):
         to_color(message, "/c")
-    with pytest.raises(DatasetError, match="compressed image of /c is damaged"):
+    with pytest.raises(DatasetError, match="compressed image of /c cannot be decoded"):
         to_color(SimpleNamespace(data=np.zeros(5, np.uint8)), "/c")
     with pytest.raises(DatasetError, match="CameraInfo of /i is not usable"):
         to_intrinsics(SimpleNamespace(width=6, height=4, k=[0.0] * 9, d=[]), "/i")

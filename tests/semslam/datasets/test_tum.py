@@ -12,7 +12,7 @@ from semslam.datasets.tum import TumDataset
 from semslam.datasets.tum_format import read_trajectory
 from semslam.errors import DatasetError, TrajectoryError
 
-CAMERA = "width: 64\nheight: 48\nfx: 60\nfy: 60\ncx: 31.5\ncy: 23.5\n"
+CAMERA = "width: 64\nheight: 48\nfx: 60\nfy: 60\ncx: 31.5\ncy: 23.5\ndepth_scale: 5000\n"
 TRUTH = "".join(f"{i / 10} {i} 2 3 0 0 0.1 0.995\n" for i in range(5))
 
 

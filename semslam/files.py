@@ -1,0 +1,84 @@
+"""Files from outside, read within limits: regular files alone, no more bytes than a reader expects."""
+
+import stat
+import zipfile
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from semslam.errors import SemslamError
+
+MAX_TEXT_BYTES = 512 * 2**20
+MAX_ARRAY_BYTES = 8 * 2**30
+
+
+def read_bytes(path: Path, what: str, error: type[SemslamError], limit: int) -> bytes:
+    """Read a regular file whole.
+
+    Args:
+        path: the file; a pipe, a device or a folder is refused before it is opened.
+        what: what it should be, for the message, such as "The list".
+        error: raised where it cannot be read.
+        limit: bytes it may have.
+
+    Raises:
+        SemslamError: an ``error`` in one sentence: it is missing, no regular file, too large or not readable.
+    """
+    try:
+        status = path.stat()
+        if stat.S_ISDIR(status.st_mode):
+            raise error(f"{what} {path} cannot be read: it is a directory.")
+        if not stat.S_ISREG(status.st_mode):
+            raise error(f"{what} {path} cannot be read: it is no regular file.")
+        with path.open("rb") as stream:
+            data = stream.read(min(status.st_size, limit) + 1)
+            if len(data) <= limit:
+                data += stream.read(limit + 1 - len(data))  # the file may have grown, or state no size (/proc)
+    except (OSError, ValueError) as reason:  # a ValueError is a NUL in the path
+        text = (reason.strerror or str(reason)) if isinstance(reason, OSError) else "its name is not usable"
+        raise error(f"{what} {path} cannot be read: {text}.") from reason
+    if len(data) > limit:
+        raise error(f"{what} {path} cannot be read: it has more than {limit / 1e6:.0f} MB.")
+    return data
+
+
+def read_text(path: Path, what: str, error: type[SemslamError], limit: int = MAX_TEXT_BYTES) -> str:
+    """Read a UTF-8 text file whole, without a byte order mark; see ``read_bytes``.
+
+    Raises:
+        SemslamError: an ``error`` as of ``read_bytes``, or the file is not text.
+    """
+    try:
+        return read_bytes(path, what, error, limit).decode("utf-8-sig")
+    except UnicodeDecodeError as reason:
+        raise error(f"{what} {path} cannot be read: it is not text.") from reason
+
+
+def read_arrays(
+    path: Path, what: str, error: type[SemslamError], limit: int = MAX_ARRAY_BYTES
+) -> dict[str, npt.NDArray[Any]]:
+    """Read all arrays of an npz file; nothing in it is unpickled.
+
+    Args:
+        path: the file.
+        what: as for ``read_bytes``.
+        error: as for ``read_bytes``.
+        limit: bytes that the arrays may take unpacked.
+
+    Raises:
+        SemslamError: an ``error`` in one sentence: the file cannot be read, is damaged, no npz, or too large.
+    """
+    data = read_bytes(path, what, error, limit)
+    try:
+        with zipfile.ZipFile(BytesIO(data)) as archive:
+            unpacked = sum(member.file_size for member in archive.infolist())
+        if unpacked <= limit:
+            with np.load(BytesIO(data), allow_pickle=False) as arrays:
+                return {name: arrays[name] for name in arrays.files}
+    # zipfile, zlib, struct, tokenize and numpy each raise errors of their own on damaged data.
+    except Exception as reason:
+        raise error(f"{what} {path} is damaged, or no npz file.") from reason
+    raise error(f"{what} {path} cannot be read: unpacked it has more than {limit / 1e6:.0f} MB.")
