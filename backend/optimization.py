@@ -20,6 +20,7 @@ from semslam.backend.graph.factors import (
 from semslam.backend.graph.products import Edge, GraphSolution, LoopVerdict, loop_edge
 from semslam.backend.robust.calibration import cycle_scale, loop_scale, odometry_scale
 from semslam.backend.robust.plausibility import Screening, screen_loops
+from semslam.backend.robust.second_start import SecondStart
 from semslam.backend.robust.strategy import (
     RobustProblem,
     RobustSolution,
@@ -27,6 +28,7 @@ from semslam.backend.robust.strategy import (
     build_strategy,
     solve_robustly,
 )
+from semslam.backend.steps import Steps
 from semslam.config import BackendConfig
 from semslam.geometry.se3 import invert
 from semslam.types import FloatArray, LoopConstraint, RejectionReason
@@ -64,12 +66,15 @@ class GraphProblem:
         return {k: move @ poses[k] for k in component}
 
 
-def optimize_graph(problem: GraphProblem, config: BackendConfig) -> GraphSolution:
-    """Optimise robustly and judge each loop.
+def optimize_graph(
+    problem: GraphProblem, config: BackendConfig, second_start: SecondStart | None = None
+) -> Steps[GraphSolution]:
+    """Optimise robustly and judge each loop, in steps.
 
     Args:
         problem: the graph, with at least one keyframe.
         config: strategy and limits.
+        second_start: looks for a better minimum than that of the poses given.
 
     Raises:
         GraphError: the optimiser failed.
@@ -82,31 +87,50 @@ def optimize_graph(problem: GraphProblem, config: BackendConfig) -> GraphSolutio
     for component in maps:
         start.update(problem.anchored(problem.poses, component))
     start = place_components(start, maps, edges)
+    yield
     odometry_factor, loop_factor = _scales(problem, edges, config)
+    yield
     loops = [edge.widened(loop_factor) for edge in edges]
     odometry = [edge.widened(odometry_factor) for edge in problem.odometry]
     screening = _screen(problem, odometry, loops, strategy, config)
+    yield
     eligible = [loop for loop, fit in zip(loops, screening.eligible, strict=True) if fit]
     trusted = _trusted(problem, maps, start, odometry)
     robust = RobustProblem(trusted, odometry, eligible, make_values(start), config.max_residual, config.max_iterations)
-    result = solve_robustly(strategy, robust)
+    yield
+    result = yield from solve_robustly(strategy, robust)
+    if second_start is not None:
+        result = yield from second_start(strategy, robust, result)
     poses = read_poses(result.values, problem.poses)
     limit = np.inf if strategy.accepts_all else config.max_residual
     verdicts = _judge(problem, result, loops, screening, poses, limit)
-    accepted = np.array([verdict.accepted for verdict in verdicts], dtype=bool)
-    kept = [edge for edge, good in zip(edges, accepted, strict=True) if good]
+    yield
+    cost = float(trusted.error(result.values) + sum(0.5 * v.weight * v.residual**2 for v in verdicts))
+    return _solution(problem, edges, verdicts, poses, (odometry_factor, loop_factor), cost)
+
+
+def _solution(
+    problem: GraphProblem,
+    edges: Sequence[Edge],
+    verdicts: tuple[LoopVerdict, ...],
+    poses: Mapping[int, FloatArray],
+    scales: tuple[float, float],
+    cost: float,
+) -> GraphSolution:
+    """Poses and loops as they are handed out: maps that only false loops had moved go back to their own anchors."""
+    kept = [edge for edge, verdict in zip(edges, verdicts, strict=True) if verdict.accepted]
     components = connected_components(problem.poses, [*problem.odometry, *kept])
     home: dict[int, FloatArray] = {}
-    for component in components:  # a map that only false loops had moved goes back to its own anchor
+    for component in components:
         home.update(problem.anchored(poses, component))
     return GraphSolution(
         poses={key: home[key] for key in problem.poses},
         verdicts=verdicts,
         edges=(*problem.odometry, *kept),
         anchors=tuple(problem.anchor(component) for component in components),
-        cost=float(trusted.error(result.values) + sum(0.5 * v.weight * v.residual**2 for v in verdicts)),
-        odometry_scale=odometry_factor,
-        loop_scale=loop_factor,
+        cost=cost,
+        odometry_scale=scales[0],
+        loop_scale=scales[1],
         components=tuple(components),
         covisible=tuple(problem.covisible),
     )

@@ -5,6 +5,8 @@ import numpy.typing as npt
 from semslam.backend.graph.checks import checked_covariance, checked_pose
 from semslam.backend.graph.products import Edge, GraphSolution, LoopVerdict, PosedGraph, loop_edge
 from semslam.backend.optimization import GraphProblem, optimize_graph
+from semslam.backend.robust.second_start import SecondStart, from_chordal_start
+from semslam.backend.steps import Steps, finish
 from semslam.config import BackendConfig
 from semslam.errors import GraphError
 from semslam.geometry.poses import PoseLike
@@ -112,11 +114,22 @@ class PoseGraph:
             raise GraphError(f"There is no loop from {match} to {query}.")
 
     def optimize(self) -> GraphSolution:
-        """Optimise by the configured strategy.
+        """Optimise by the configured strategy, from odometry's start and, where that ends lower, from a chordal one.
 
         Raises:
             GraphError: the graph is empty or the optimiser failed.
             ConfigError: the strategy's name is unknown.
+        """
+        return finish(self.steps(from_chordal_start))
+
+    def steps(self, second_start: SecondStart | None = None) -> Steps[GraphSolution]:
+        """The optimisation of the graph as it is now, in steps between which the graph may grow.
+
+        Args:
+            second_start: looks for a better minimum than that of odometry's start.
+
+        Raises:
+            GraphError: the graph is empty, or, in one of the steps, the optimiser failed.
         """
         if not self._poses:
             raise GraphError("The pose graph has no keyframe.")
@@ -127,7 +140,7 @@ class PoseGraph:
             constraints=tuple(self._loops.values()),
             covisible=tuple(self._covisible.values()),
         )
-        return optimize_graph(problem, self._config)
+        return optimize_graph(problem, self._config, second_start)
 
     def _require(self, key: int) -> None:
         if key not in self._poses:

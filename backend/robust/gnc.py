@@ -4,8 +4,9 @@ from typing import Self
 
 import numpy as np
 
-from semslam.backend.robust.least_squares import LeastSquares, optimise, settle
+from semslam.backend.robust.least_squares import LeastSquares, iterate, settle
 from semslam.backend.robust.strategy import RobustProblem, RobustSolution
+from semslam.backend.steps import Steps
 from semslam.config import BackendConfig
 from semslam.types import FloatArray
 
@@ -30,21 +31,21 @@ class GraduatedNonConvexity:
         """Take no settings."""
         return cls()
 
-    def solve(self, problem: RobustProblem) -> RobustSolution:
+    def solve(self, problem: RobustProblem) -> Steps[RobustSolution]:
         """Loops with weights 0 or 1."""
         if not problem.loops:
-            return LeastSquares().solve(problem)
+            return (yield from LeastSquares().solve(problem))
         limit = problem.max_residual**2
         values, squared = problem.initial, problem.squared_residuals(problem.initial)
         mu = float(np.clip(limit / max(2 * squared.max() - limit, limit), START, 1.0))
         for _ in range(STEPS):
             weights = truncated_weights(squared, limit, mu)
-            values = optimise(problem.weighted(weights), values, INNER_STEPS)
+            values = yield from iterate(problem.weighted(weights), values, INNER_STEPS)
             squared = problem.squared_residuals(values)
             if ((weights == 0) | (weights == 1)).all():
                 break
             mu *= GROWTH
-        return settle(problem, values, squared)
+        return (yield from settle(problem, values, squared))
 
 
 def truncated_weights(squared: FloatArray, limit: float, mu: float) -> FloatArray:

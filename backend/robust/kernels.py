@@ -7,8 +7,9 @@ import gtsam
 import numpy as np
 
 from semslam.backend.graph.factors import between_factor
-from semslam.backend.robust.least_squares import optimise
+from semslam.backend.robust.least_squares import iterate
 from semslam.backend.robust.strategy import RobustProblem, RobustSolution
+from semslam.backend.steps import Steps
 from semslam.config import BackendConfig
 
 Kernel = gtsam.noiseModel.mEstimator.DCS | gtsam.noiseModel.mEstimator.Cauchy | gtsam.noiseModel.mEstimator.Huber
@@ -34,13 +35,13 @@ class _KernelStrategy(ABC):
     def kernel(self) -> Kernel:
         """A fresh kernel."""
 
-    def solve(self, problem: RobustProblem) -> RobustSolution:
+    def solve(self, problem: RobustProblem) -> Steps[RobustSolution]:
         """Loops with weights between 0 and 1."""
         kernel = self.kernel()
         graph = gtsam.NonlinearFactorGraph(problem.trusted)
         for edge in problem.loops:
             graph.add(between_factor(edge, kernel))
-        values = optimise(graph, problem.initial, problem.max_iterations)
+        values = yield from iterate(graph, problem.initial, problem.max_iterations)
         residuals = np.sqrt(problem.squared_residuals(values))
         return RobustSolution(values, np.array([kernel.weight(residual) for residual in residuals]))
 

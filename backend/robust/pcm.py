@@ -6,8 +6,9 @@ import numpy as np
 
 from semslam.backend.graph.chain import OdometryChain
 from semslam.backend.robust.consistency import consistent_loops
-from semslam.backend.robust.least_squares import LeastSquares, optimise, settle
+from semslam.backend.robust.least_squares import LeastSquares, iterate, settle
 from semslam.backend.robust.strategy import RobustProblem, RobustSolution
+from semslam.backend.steps import Steps
 from semslam.config import BackendConfig
 
 
@@ -22,14 +23,14 @@ class PairwiseConsistency:
         """Take no settings."""
         return cls()
 
-    def solve(self, problem: RobustProblem) -> RobustSolution:
+    def solve(self, problem: RobustProblem) -> Steps[RobustSolution]:
         """Loops with weights 0 or 1."""
         if not problem.loops:
-            return LeastSquares().solve(problem)
+            return (yield from LeastSquares().solve(problem))
         chain = OdometryChain(problem.initial.keys(), problem.odometry)
         chosen = consistent_loops(chain, problem.loops, problem.max_residual)
         graph = problem.weighted(chosen.astype(np.float64))
-        values = optimise(graph, problem.initial, problem.max_iterations)
+        values = yield from iterate(graph, problem.initial, problem.max_iterations)
         squared = problem.squared_residuals(values)
         squared[~chosen] = np.inf  # a loop outside the set stays out, however well it fits by now
-        return settle(problem, values, squared)
+        return (yield from settle(problem, values, squared))

@@ -28,6 +28,8 @@ ALONE = 1.5
 """How many times the limit a pair must be off that alone sets two groups apart: one in a thousand is off by chance."""
 UNIT = 1.0
 """Mahalanobis distances below this are all alike."""
+LINEAR = 0.5
+"""Radians: beyond this deviation of heading (root of the sum over three axes) odometry contradicts no loop."""
 BLOCK = 50_000
 """Pairs that are worked on at a time."""
 
@@ -64,24 +66,30 @@ def screen_loops(chain: OdometryChain, loops: Sequence[Edge], max_residual: floa
     """
     if not loops:
         return Screening(np.zeros(0), ())
-    distances, joined = distances_from_odometry(chain, loops)
-    limit = slack * max_residual
-    reasons: list[RejectionReason | None] = [RejectionReason.INCONSISTENT if d > limit else None for d in distances]
-    plausible = np.flatnonzero(joined & (distances <= limit))
+    distances, joined, linear = distances_from_odometry(chain, loops)
+    contradicted = (distances > slack * max_residual) & linear
+    reasons: list[RejectionReason | None] = [RejectionReason.INCONSISTENT if no else None for no in contradicted]
+    plausible = np.flatnonzero(joined & ~contradicted)
     doubtful = _ambiguous(chain, [loops[i] for i in plausible.tolist()], distances[plausible], max_residual)
     for index in plausible[doubtful]:
         reasons[index] = RejectionReason.AMBIGUOUS
     return Screening(distances, tuple(reasons))
 
 
-def distances_from_odometry(chain: OdometryChain, loops: Sequence[Edge]) -> tuple[FloatArray, BoolArray]:
-    """Mahalanobis distances (L,) between loops and odometry alone, 0 where it does not join the ends, and where so."""
+def distances_from_odometry(chain: OdometryChain, loops: Sequence[Edge]) -> tuple[FloatArray, BoolArray, BoolArray]:
+    """Mahalanobis distances between loops and odometry alone.
+
+    Returns:
+        (L,) distances, 0 where odometry does not join the ends; (L,) whether it does; (L,) whether its heading is known
+        well enough for a covariance to first order to describe where the other end may lie.
+    """
     T, covariance, joined = chain.relative([e.from_key for e in loops], [e.to_key for e in loops])
     left = deviations(invert(np.stack([loop.T_from_to for loop in loops])) @ T)
     own = np.stack([loop.covariance for loop in loops])
     distances = np.zeros(len(loops))
     distances[joined] = np.sqrt(squared_mahalanobis(left[joined], (own + covariance)[joined]))
-    return distances, joined
+    linear = np.trace(covariance[:, :3, :3], axis1=1, axis2=2) < LINEAR**2
+    return distances, joined, linear
 
 
 def _ambiguous(chain: OdometryChain, loops: Sequence[Edge], distances: FloatArray, limit: float) -> BoolArray:

@@ -10,6 +10,7 @@ import numpy as np
 from semslam import plugins
 from semslam.backend.graph.factors import between_factor
 from semslam.backend.graph.products import Edge
+from semslam.backend.steps import Steps
 from semslam.config import BackendConfig
 from semslam.errors import GraphError
 from semslam.types import FloatArray
@@ -49,6 +50,10 @@ class RobustProblem:
         """Squared Mahalanobis distances (L,) of the loops."""
         return np.array([2.0 * between_factor(edge).error(values) for edge in self.loops])
 
+    def truncated_cost(self, values: gtsam.Values, limit: float) -> float:
+        """Half the sum of squared residuals, each loop's cut off at the square of ``limit``."""
+        return float(self.trusted.error(values) + 0.5 * np.minimum(self.squared_residuals(values), limit**2).sum())
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RobustSolution:
@@ -75,8 +80,11 @@ class RobustStrategy(Protocol):
         """Build it from the section ``backend``."""
         ...
 
-    def solve(self, problem: RobustProblem) -> RobustSolution:
+    def solve(self, problem: RobustProblem) -> Steps[RobustSolution]:
         """Optimised values, and how far each loop is followed.
+
+        A generator: it yields now and then, after each iteration of the optimiser at best, so that a live run can
+        spread the work over keyframes, and returns the solution.
 
         Raises:
             RuntimeError: GTSAM's own, such as an indeterminate system.
@@ -93,14 +101,14 @@ def build_strategy(config: BackendConfig) -> RobustStrategy:
     return plugins.load("semslam.robust", config.robust).from_config(config)
 
 
-def solve_robustly(strategy: RobustStrategy, problem: RobustProblem) -> RobustSolution:
+def solve_robustly(strategy: RobustStrategy, problem: RobustProblem) -> Steps[RobustSolution]:
     """Optimise by a strategy.
 
     Raises:
         GraphError: the optimiser gave up or returned values that are not finite.
     """
     try:
-        solution = strategy.solve(problem)
+        solution = yield from strategy.solve(problem)
     except RuntimeError as error:
         raise GraphError(f"The pose graph could not be optimised: {' '.join(str(error).split())}") from error
     if not np.isfinite(problem.trusted.error(solution.values)):

@@ -15,6 +15,8 @@ from semslam.cli.console import out, remark, remarks
 from semslam.errors import ConfigError
 
 if TYPE_CHECKING:
+    from semslam.backend.analysis.certificate import Certificate
+    from semslam.backend.graph.products import GraphSolution
     from semslam.types import LedgerEntry, LoopContribution
 
 RunFolder = Annotated[Path, typer.Argument(help="A run folder.")]
@@ -54,8 +56,10 @@ def graph_command(
     out_file: Annotated[Path | None, typer.Option("--out", help="Where the optimised graph goes.")] = None,
     config: options.ConfigFile = None,
     overrides: options.Settings = None,
+    as_json: options.Json = False,
 ) -> None:
-    """Optimise a graph from elsewhere and judge its loops."""
+    """Optimise a graph from elsewhere, judge its loops and certify the optimum."""
+    from semslam.backend.analysis.certificate import certify
     from semslam.backend.analysis.judge import judge_graph
     from semslam.backend.graph.g2o import read_g2o, write_g2o
     from semslam.backend.graph.keys import key_name
@@ -63,17 +67,56 @@ def graph_command(
     graph = read_g2o(file)
     remarks(graph.notes)
     solution = judge_graph(graph, options.settings(config, overrides).backend)
+    certificate = certify(solution)
+    if out_file is not None:
+        write_g2o(out_file, solution)
+    if as_json:
+        typer.echo(json.dumps(_graph_fields(solution, certificate)))
+        return
     accepted = sum(verdict.accepted for verdict in solution.verdicts)
     out.print(f"{len(graph.poses)} poses, {len(graph.edges)} edges, {len(solution.components)} connected parts")
     out.print(f"loops: {accepted} of {len(solution.verdicts)} accepted; cost {solution.cost:.6g}")
+    out.print(f"optimum: {_certified(certificate)}")
     worst = sorted((v for v in solution.verdicts if not v.accepted), key=lambda v: -v.residual)
     for v in worst[:20]:
         pair = v.constraint.candidate
         ends = f"{key_name(pair.match)} - {key_name(pair.query)}"
         out.print(f"  refused: {ends}, {v.residual:.1f} standard deviations off")
     if out_file is not None:
-        write_g2o(out_file, solution)
         out.print(f"Written to {out_file}", soft_wrap=True)
+
+
+def _certified(certificate: "Certificate") -> str:
+    if certificate.gap is None:
+        return "not certified; it may be a local minimum"
+    share = f"{100 * certificate.gap:.2g} %"
+    if certificate.certified:
+        return f"certified; no other poses cost less by more than {share}"
+    return f"not certified; poses that cost less by up to {share} are not ruled out"
+
+
+def _graph_fields(solution: "GraphSolution", certificate: "Certificate") -> dict[str, object]:
+    refused = [verdict for verdict in solution.verdicts if not verdict.accepted]
+    return {
+        "poses": len(solution.poses),
+        "components": len(solution.components),
+        "odometry_edges": len(solution.odometry),
+        "loops": {"all": len(solution.verdicts), "accepted": len(solution.loops)},
+        "cost": solution.cost,
+        "certified": certificate.certified,
+        "gap": certificate.gap,
+        "chordal_cost": certificate.cost,
+        "chordal_bound": certificate.bound,
+        "refused": [
+            {
+                "match": verdict.constraint.candidate.match,
+                "query": verdict.constraint.candidate.query,
+                "residual": verdict.residual,
+                "reason": verdict.reason,
+            }
+            for verdict in refused
+        ],
+    }
 
 
 def stress_command(
@@ -151,8 +194,12 @@ COMMANDS = (
     Command(
         "graph",
         graph_command,
-        "Optimise a g2o graph from elsewhere and judge its loops.",
-        example("semslam graph sphere.g2o", "semslam graph FILE.g2o --set backend.robust=dcs --out better.g2o"),
+        "Optimise a g2o graph from elsewhere, judge its loops and certify the optimum.",
+        example(
+            "semslam graph sphere.g2o",
+            "semslam graph FILE.g2o --json",
+            "semslam graph FILE.g2o --set backend.robust=dcs --out better.g2o",
+        ),
     ),
     Command(
         "stress",

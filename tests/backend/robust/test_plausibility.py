@@ -158,3 +158,16 @@ def test_one_noisy_pair_does_not_split_a_group_in_two():
     loops = measure(truth, pairs, rng, 1.0, np.array([0.01] * 3 + [0.02] * 3))
     chain = OdometryChain(range(240), measure_odometry(truth, rng))
     assert set(screen_loops(chain, loops, LIMIT / 1.5, 1.5).reasons) == {None}
+
+
+def test_odometry_that_has_lost_its_heading_contradicts_no_loop():
+    """Beyond half a radian a covariance to first order is too small on the far side of the way."""
+    far = [Edge(0, 14, make_transform(np.eye(3), [40.0, 0.0, 0.0]), 1e-4 * np.eye(6))]
+
+    def found(turn):
+        covariance = np.diag([turn**2] * 3 + [1e-4] * 3)
+        odometry = [Edge(k, k + 1, make_transform(np.eye(3), [0.3, 0.0, 0.0]), covariance) for k in range(14)]
+        return screen_loops(OdometryChain(range(15), odometry), far, 4.7, 1.5).reasons
+
+    assert found(0.01) == ("inconsistent",)
+    assert found(0.1) == (None,)

@@ -35,6 +35,16 @@ def test_a_graph_from_elsewhere_is_judged(semslam: Call, ring: Path, tmp_path: P
     assert len(read_g2o(tmp_path / "better.g2o").edges) == 23 + 4
 
 
+def test_a_graph_is_certified(semslam: Call, ring: Path) -> None:
+    outcome = semslam("graph", ring)
+    assert "optimum: certified" in outcome.out
+    fields = json.loads(semslam("graph", ring, "--json").out)
+    assert fields["certified"] is True
+    assert 0 <= fields["gap"] < 1e-3
+    assert fields["loops"] == {"all": 5, "accepted": 4}
+    assert [(loop["match"], loop["query"]) for loop in fields["refused"]] == [(3, 15)]
+
+
 @pytest.mark.parametrize("content", ["", "EDGE_SE3:QUAT 0 1 nonsense\n", "\x00\x01"])
 def test_a_file_that_is_no_graph_is_one_sentence(semslam: Call, tmp_path: Path, content: str) -> None:
     (tmp_path / "bad.g2o").write_text(content)
