@@ -1,13 +1,39 @@
 """RGB-D SLAM whose loop closures come from semantics.
 
 Names are imported when they are first used (PEP 562): the packages below this one import its modules, and
-``import semslam`` must not pull in torch, open3d or gtsam.
+``import semslam`` must not pull in torch, open3d or gtsam. A type checker reads the imports below instead.
 """
 
 from importlib import import_module
-from typing import Any
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from semslam.config import Config, load_config
+    from semslam.datasets import open_dataset
+    from semslam.datasets.dataset import Dataset
+    from semslam.errors import SemslamError
+    from semslam.runs.pipeline import RunResult, run
+    from semslam.system.closer import LoopCloser
+    from semslam.system.slam import Slam
+    from semslam.types import Frame, Intrinsics, Trajectory
 
 __version__ = "0.1.0"
+
+__all__ = [
+    "Config",
+    "Dataset",
+    "Frame",
+    "Intrinsics",
+    "LoopCloser",
+    "RunResult",
+    "SemslamError",
+    "Slam",
+    "Trajectory",
+    "__version__",
+    "load_config",
+    "open_dataset",
+    "run",
+]
 
 _HOMES = {
     "Config": "semslam.config",
@@ -24,12 +50,13 @@ _HOMES = {
     "run": "semslam.runs.pipeline",
 }
 
+if not TYPE_CHECKING:  # a type checker that saw this would take every misspelt name for Any
 
-def __getattr__(name: str) -> Any:
-    if name in _HOMES:
-        return getattr(import_module(_HOMES[name]), name)
-    raise AttributeError(f"module 'semslam' has no attribute '{name}'")
+    def __getattr__(name):
+        if name in _HOMES:
+            return getattr(import_module(_HOMES[name]), name)
+        raise AttributeError(f"module 'semslam' has no attribute '{name}'")
 
 
 def __dir__() -> list[str]:
-    return ["__version__", *sorted(_HOMES)]
+    return __all__

@@ -1,5 +1,6 @@
 """semslam config, doctor, download."""
 
+import json
 import platform
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -26,9 +27,20 @@ PACKAGES = (
 MODULES = {"opencv-python-headless": "cv2", "scikit-learn": "sklearn", "kiss-icp": "kiss_icp"}
 
 
-def config_command(config: options.ConfigFile = None, overrides: options.Settings = None) -> None:
-    """Print the effective settings as YAML."""
-    typer.echo(options.settings(config, overrides).dump(), nl=False)
+def config_command(
+    place: Annotated[str | None, typer.Argument(metavar="[SECTION]", help="Print this section alone.")] = None,
+    config: options.ConfigFile = None,
+    overrides: options.Settings = None,
+    schema: Annotated[bool, typer.Option("--schema", help="Print a JSON schema for editors instead.")] = False,
+) -> None:
+    """Print the effective settings as YAML, each with its description, unit, range and default."""
+    from semslam.config.explained import commented_yaml, json_schema
+
+    chosen = options.settings(config, overrides)
+    if schema:
+        typer.echo(json.dumps(json_schema(chosen), indent=2))
+    else:
+        typer.echo(commented_yaml(chosen, place), nl=False)
 
 
 def doctor_command() -> None:
@@ -78,7 +90,14 @@ def _import_version(package: str) -> str:
 
 
 COMMANDS = (
-    Command("config", config_command, "Print the effective settings as YAML.", example("semslam config > my.yaml")),
+    Command(
+        "config",
+        config_command,
+        "Print the effective settings as YAML, each with its description, unit, range and default.",
+        example(
+            "semslam config > my.yaml", "semslam config keyframes", "semslam config --schema > semslam.schema.json"
+        ),
+    ),
     Command("doctor", doctor_command, "Check that everything a run needs is here."),
     Command(
         "download",

@@ -5,7 +5,7 @@ from functools import lru_cache
 from typing import Any, Self, TypeVar
 
 import yaml
-from pydantic import ConfigDict, Field, ValidationError, model_validator
+from pydantic import ConfigDict, ValidationError, model_validator
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from semslam import plugins
@@ -42,9 +42,7 @@ class Config(Section):
     loops: LoopConfig = LoopConfig()
     verification: VerificationConfig = VerificationConfig()
     backend: BackendConfig = BackendConfig()
-    plugins: dict[str, dict[str, Any]] = Field(
-        {}, description="settings, by name, of outside implementations that declare none"
-    )
+    plugins: dict[str, dict[str, Any]] = setting({}, "settings, by name, of outside implementations that declare none")
 
     @model_validator(mode="after")
     def _read_own_sections(self) -> Self:

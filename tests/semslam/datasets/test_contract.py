@@ -1,7 +1,6 @@
-"""Every registered loader fills the role of a dataset."""
+"""Every registered loader keeps the contract; selection, faults and colour order on top of it."""
 
 from collections.abc import Callable
-from itertools import pairwise
 from pathlib import Path
 
 import cv2
@@ -13,7 +12,7 @@ from semslam.config import DatasetConfig, FaultConfig
 from semslam.datasets import Dataset, guess_loader, open_dataset
 from semslam.datasets.camera_file import write_camera
 from semslam.geometry.camera import Intrinsics
-from semslam.types import Trajectory
+from semslam.testing import DatasetContract
 
 CAMERA = Intrinsics(64, 48, 60.0, 60.0, 31.5, 23.5)
 COUNT = 4
@@ -118,68 +117,23 @@ MAKERS: dict[str, Callable[[Path], Path | str]] = {
 }
 
 
-@pytest.fixture(scope="module", params=plugins.names("semslam.datasets"))
-def opened(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[str, Path | str]:
-    name = request.param
-    if name not in MAKERS:
-        pytest.skip(f"no sample of the outside loader '{name}'")
-    return name, MAKERS[name](tmp_path_factory.mktemp(name))
+class TestDataset(DatasetContract):
+    @pytest.fixture(autouse=True, params=list(plugins.DATASETS))
+    def choose(self, request: pytest.FixtureRequest) -> None:
+        self.name = request.param
+        self.implementation = plugins.load("semslam.datasets", self.name)
+
+    def sample(self, folder: Path) -> Path | str:
+        return MAKERS[self.name](folder)
 
 
-@pytest.fixture(scope="module")
-def dataset(opened: tuple[str, Path | str]) -> Dataset:
-    return open_dataset(opened[1], DatasetConfig(max_frames=COUNT))
+@pytest.fixture(params=list(plugins.DATASETS))
+def opened(request: pytest.FixtureRequest, tmp_path: Path) -> tuple[str, Path | str]:
+    return request.param, MAKERS[request.param](tmp_path)
 
 
 def test_the_loader_is_guessed_from_the_path(opened: tuple[str, Path | str]) -> None:
     assert guess_loader(opened[1]) == opened[0]
-
-
-def test_it_fills_the_role(dataset: Dataset) -> None:
-    assert isinstance(dataset, Dataset)
-    assert dataset.name
-    assert all(isinstance(note, str) for note in dataset.notes)
-    assert dataset.ground_truth is None or isinstance(dataset.ground_truth, Trajectory)
-
-
-def test_the_stamps_ascend(dataset: Dataset) -> None:
-    assert len(dataset) == len(dataset.timestamps) == COUNT
-    assert all(earlier < later for earlier, later in pairwise(dataset.timestamps))
-
-
-def test_frames_are_as_promised(dataset: Dataset) -> None:
-    for i, frame in enumerate(dataset):
-        shape = (dataset.intrinsics.height, dataset.intrinsics.width)
-        assert (frame.index, frame.timestamp, frame.intrinsics) == (i, dataset.timestamps[i], dataset.intrinsics)
-        assert frame.color.shape == (*shape, 3)
-        assert frame.color.dtype == np.uint8
-        assert frame.depth.shape == shape
-        assert frame.depth.dtype == np.float32
-        assert np.isfinite(frame.depth).all()
-        assert (frame.depth >= 0).all()
-        assert (frame.depth > 0).any()
-        assert (frame.depth < 100).all()
-
-
-def test_frames_are_the_same_in_any_order(dataset: Dataset) -> None:
-    forward = list(dataset)
-    for i in reversed(range(len(dataset))):
-        again = dataset.frame(i)
-        assert np.array_equal(again.color, forward[i].color)
-        assert np.array_equal(again.depth, forward[i].depth)
-
-
-def test_there_are_no_frames_outside(dataset: Dataset) -> None:
-    for index in (-1, len(dataset)):
-        with pytest.raises(IndexError):
-            dataset.frame(index)
-
-
-def test_ground_truth_meets_the_frames(dataset: Dataset) -> None:
-    if dataset.ground_truth is not None:
-        first, last = dataset.ground_truth.timestamps[[0, -1]]
-        assert first <= dataset.timestamps[-1]
-        assert last >= dataset.timestamps[0]
 
 
 def test_selection_and_faults_keep_the_role(opened: tuple[str, Path | str]) -> None:
