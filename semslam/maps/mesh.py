@@ -6,10 +6,9 @@ from typing import TYPE_CHECKING
 import cv2
 import numpy as np
 
-from semslam.geometry.se3 import Float32Array, invert
+from semslam.geometry.se3 import invert
 from semslam.maps.ply import tensor
 from semslam.maps.views import MAX_DEPTH, PosedView, at_edges
-from semslam.types import Frame, UInt8Array
 
 if TYPE_CHECKING:
     from open3d.geometry import TriangleMesh
@@ -36,15 +35,15 @@ def fuse_mesh(views: Iterable[PosedView], voxel: float = VOXEL) -> "TriangleMesh
     """
     import open3d as o3d
 
-    values, shapes = (o3d.core.float32, o3d.core.uint16, o3d.core.uint16), ((1,), (1,), (3,))
+    values = (o3d.core.float32, o3d.core.uint16, o3d.core.uint16)
+    shapes = [o3d.core.SizeVector([size]) for size in (1, 1, 3)]
     grid = o3d.t.geometry.VoxelBlockGrid(("tsdf", "weight", "color"), values, shapes, voxel, BLOCK, BLOCKS)
     for view in views:
-        color, depth = _undistorted(view.frame)
-        matrix, T_cam_world = tensor(view.frame.intrinsics.matrix), tensor(invert(view.T_world_cam))
-        image, photo = (
-            o3d.t.geometry.Image(tensor(depth)),
-            o3d.t.geometry.Image(tensor(color.astype(np.float32))),
-        )
+        camera, depth = view.frame.intrinsics, np.where(at_edges(view.frame.depth), np.float32(0), view.frame.depth)
+        color = camera.undistort_image(view.frame.color, cv2.INTER_LINEAR).astype(np.float32)
+        matrix, T_cam_world = tensor(camera.matrix), tensor(invert(view.T_world_cam))
+        photo = o3d.t.geometry.Image(tensor(color))
+        image = o3d.t.geometry.Image(tensor(camera.undistort_image(depth, cv2.INTER_NEAREST)))
         seen = grid.compute_unique_block_coordinates(image, matrix, T_cam_world, 1.0, MAX_DEPTH, TRUNCATION)
         grid.integrate(seen, image, photo, matrix, matrix, T_cam_world, 1.0, MAX_DEPTH, TRUNCATION)
     return _ordered(grid.extract_triangle_mesh(MIN_WEIGHT).to_legacy())
@@ -68,18 +67,3 @@ def _ordered(mesh: "TriangleMesh") -> "TriangleMesh":
     ordered.vertex_colors = o3d.utility.Vector3dVector(np.asarray(mesh.vertex_colors).reshape(-1, 3)[order] / 255.0)
     ordered.compute_vertex_normals()
     return ordered
-
-
-def _undistorted(frame: Frame) -> tuple[UInt8Array, Float32Array]:
-    """Colour, and depth without its edges, as an ideal pinhole would see them."""
-    depth = np.where(at_edges(frame.depth), np.float32(0), frame.depth)
-    camera = frame.intrinsics
-    if not camera.is_distorted:
-        return np.ascontiguousarray(frame.color), depth
-    size = (camera.width, camera.height)
-    maps = cv2.initUndistortRectifyMap(
-        camera.matrix, np.array(camera.distortion), None, camera.matrix, size, cv2.CV_32FC1
-    )
-    color = cv2.remap(frame.color, *maps, cv2.INTER_LINEAR)
-    # Nearest neighbour: a mean of two depths lies on neither surface.
-    return np.asarray(color, np.uint8), np.asarray(cv2.remap(depth, *maps, cv2.INTER_NEAREST), np.float32)

@@ -15,7 +15,7 @@ from semslam.types import FloatArray
 Progress = Callable[[int, int], None]
 
 
-def _silent(done: int, whole: int) -> None:
+def silent(done: int, whole: int) -> None:
     """Report nothing."""
 
 
@@ -54,7 +54,7 @@ class SavedViews:
             raise ResultsError(f"{self.run.directory} has no keyframe between {start:g} and {end:g} s.")
         return SavedViews(self.run, self.dataset, kept)
 
-    def read(self, progress: Progress = _silent) -> Iterator[PosedView]:
+    def read(self, progress: Progress = silent) -> Iterator[PosedView]:
         """Read the keyframes' images one by one.
 
         Args:

@@ -33,12 +33,14 @@ def test_a_run_leaves_a_map_with_colours_and_normals(saved: Path) -> None:
 
 
 def test_the_maps_are_made_again_from_a_saved_run(semslam: Call, saved: Path, tmp_path: Path) -> None:
-    outcome = semslam("map", saved, "--mesh", "--voxel", 0.05, "--out", tmp_path / "maps")
+    outcome = semslam("map", saved, "--mesh", "--semantic", "--voxel", 0.05, "--out", tmp_path / "maps")
     assert outcome.code == 0, outcome.err
     cloud = o3d.io.read_point_cloud(str(tmp_path / "maps" / "map.ply"))
     mesh = o3d.io.read_triangle_mesh(str(tmp_path / "maps" / "mesh.ply"))
     sparse = o3d.io.read_point_cloud(str(saved / "map.ply"))
     assert len(mesh.triangles) > 500
+    assert (tmp_path / "maps" / "semantic.ply").exists()
+    assert (tmp_path / "maps" / "objects.json").exists()
     # The same surfaces, by other ways: nearly all points of one have one of the other beside them.
     for other in (sparse, o3d.geometry.PointCloud(mesh.vertices)):
         assert np.mean(np.asarray(other.compute_point_cloud_distance(cloud)) < 0.1) > 0.9
