@@ -4,8 +4,10 @@ import json
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from semslam.errors import ResultsError
 from semslam.geometry.voxels import VoxelTable
@@ -97,7 +99,11 @@ def write_semantic_map(directory: Path, built: SemanticMap) -> list[Path]:
         ResultsError: a file cannot be written.
     """
     painted = Cloud(built.cloud.points, built.cloud.normals, built.palette[built.labels])
-    columns = {"label": built.labels, "confidence": built.confidence, "object": built.owners.astype(np.int32)}
+    columns: dict[str, npt.NDArray[Any]] = {
+        "label": built.labels,
+        "confidence": built.confidence,
+        "object": built.owners.astype(np.int32),
+    }
     write_cloud(directory / PLY, painted, columns)
     content = {
         "voxel_m": built.voxel,
