@@ -1,4 +1,4 @@
-"""semslam map."""
+"""semslam map, view."""
 
 from pathlib import Path
 from typing import Annotated
@@ -37,11 +37,36 @@ def map_command(
         out.print(f"Written: {path}", soft_wrap=True)
 
 
+def view_command(
+    run: RunFolder,
+    file: Annotated[Path | None, typer.Option("--save", help="Write a recording (.rrd) and open no window.")] = None,
+    sequence: Sequence = None,
+) -> None:
+    """Show a saved run in the viewer."""
+    from semslam.runs.playback import play
+    from semslam.runs.saved_views import open_saved
+    from semslam.viewers.rerun_stream import open_viewer
+
+    saved = open_saved(run, sequence)
+    viewer = open_viewer(saved.run.directory.resolve().name, file, live=file is None)
+    with bar(f"{saved.dataset.name} view", len(saved.recording.frames)) as update:
+        play(saved, viewer, update)
+    viewer.close()
+    if file is not None:
+        out.print(f"Written: {file}; open it with: rerun {file}", soft_wrap=True)
+
+
 COMMANDS = (
     Command(
         "map",
         map_command,
         "Make the maps of a saved run again: a coloured cloud, a mesh, labels and objects.",
         example("semslam map runs/latest --voxel 0.01", "semslam map RUN --mesh --semantic"),
+    ),
+    Command(
+        "view",
+        view_command,
+        "Show a saved run in the viewer, or write a recording for it.",
+        example("semslam view runs/latest", "semslam view RUN --save run.rrd"),
     ),
 )

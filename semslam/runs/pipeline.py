@@ -4,20 +4,22 @@ import resource
 import time
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from functools import partial
+from functools import lru_cache, partial
 
 from semslam.config import Config
 from semslam.datasets.dataset import Dataset
 from semslam.datasets.prefetch import prefetch
 from semslam.errors import DatasetError
 from semslam.loop.verification.verifier import LoopVerifier
+from semslam.maps.cloud import join_clouds
 from semslam.runs.metrics import Metrics, TimeMetrics
 from semslam.runs.recording import RecordedFrame, Recording, checksum
-from semslam.runs.scoring import score_run
+from semslam.runs.scoring import Scores, score_run
 from semslam.runtime.stopwatch import Stopwatch
 from semslam.system.result import FrameState, SlamResult
 from semslam.system.slam import Slam
-from semslam.types import LedgerEntry, Trajectory
+from semslam.types import Frame, LedgerEntry, LoopConstraint, Trajectory
+from semslam.viewers.viewer import FinishedRun, KeyframeScene, NoViewer, ShownLoop, Viewer, aligned_truth
 
 Progress = Callable[[int, FrameState | None], None]
 
@@ -53,7 +55,9 @@ class RunResult:
     notes: tuple[str, ...]
 
 
-def run(dataset: Dataset, config: Config | None = None, progress: Progress = _silent) -> RunResult:
+def run(
+    dataset: Dataset, config: Config | None = None, progress: Progress = _silent, viewer: Viewer | None = None
+) -> RunResult:
     """Run SLAM over a dataset.
 
     An unreadable image costs its frame, is counted and noted. Ctrl-C ends the sequence early; what was computed
@@ -63,13 +67,14 @@ def run(dataset: Dataset, config: Config | None = None, progress: Progress = _si
         dataset: the sequence.
         config: settings; the defaults if None.
         progress: called after each frame with its index and its state (None if it was unreadable).
+        viewer: is shown the run as it goes; None = nobody.
 
     Raises:
         ConfigError: a name or setting is unknown.
         ModelError: the network's weights are missing or damaged.
         DatasetError: no frame at all could be read or tracked.
     """
-    session = _Session(dataset, config or Config())
+    session = _Session(dataset, config or Config(), viewer=viewer)
     session.drive(session.track(), progress)
     return session.result()
 
@@ -80,6 +85,7 @@ def replay(
     config: Config,
     progress: Progress = _silent,
     verifier: LoopVerifier | None = None,
+    viewer: Viewer | None = None,
 ) -> RunResult:
     """Repeat detection, verification and back end on a saved front end; images are read at keyframes alone.
 
@@ -91,6 +97,7 @@ def replay(
         config: settings; those of the front end must be the recorded run's (``SavedFrontEnd.check_settings``).
         progress: called after each frame with its index and its state.
         verifier: decides on candidates; none = the built-in one.
+        viewer: is shown the run as it goes; None = nobody.
 
     Raises:
         ConfigError: a name or setting is unknown.
@@ -98,7 +105,7 @@ def replay(
         DatasetError: it is another sequence, or a keyframe's image cannot be read.
     """
     recording.check(dataset)
-    session = _Session(dataset, config, verifier)
+    session = _Session(dataset, config, verifier, viewer)
     session.drive(session.repeat(recording), progress)
     return session.result()
 
@@ -106,8 +113,15 @@ def replay(
 class _Session:
     """A run between its first frame and its result."""
 
-    def __init__(self, dataset: Dataset, config: Config, verifier: LoopVerifier | None = None) -> None:
+    def __init__(
+        self,
+        dataset: Dataset,
+        config: Config,
+        verifier: LoopVerifier | None = None,
+        viewer: Viewer | None = None,
+    ) -> None:
         self._dataset, self._config = dataset, config
+        self._viewer, self._shown = viewer or NoViewer(), 0
         self._stopwatch, self._clock = Stopwatch(), _Clock()
         self._slam = Slam.from_config(config, self._stopwatch, verifier)
         self._unreadable: list[str] = []
@@ -122,15 +136,31 @@ class _Session:
                 yield index, None
             else:
                 self._checksum = self._checksum or checksum(item)
-                yield index, self._slam.process(item)
+                state = self._slam.process(item)
+                self._show(state, item)
+                yield index, state
 
     def repeat(self, recording: Recording) -> Iterator[tuple[int, FrameState]]:
         """Take each frame's motion from a recording."""
         self._unreadable.extend(recording.unreadable)
         self._checksum, self._interrupted = recording.checksum, recording.interrupted
         for frame in recording.frames:
-            read = partial(self._dataset.frame, frame.index)
-            yield frame.index, self._slam.advance(frame.index, frame.timestamp, frame.motion, read)
+            read = lru_cache(maxsize=1)(partial(self._dataset.frame, frame.index))
+            state = self._slam.advance(frame.index, frame.timestamp, frame.motion, read)
+            self._show(state, None if state.keyframe is None else read())
+            yield frame.index, state
+
+    def _show(self, state: FrameState, frame: Frame | None) -> None:
+        """Show the viewer a frame; its images are at hand at keyframes at least."""
+        self._viewer.track(frame, state)
+        if state.keyframe is not None and frame is not None:
+            keyframe, outcomes = self._slam.keyframes[-1], self._slam.outcomes[self._shown :]
+            self._shown += len(outcomes)
+            loops = tuple(
+                ShownLoop(o.candidate.query, o.candidate.match, isinstance(o, LoopConstraint)) for o in outcomes
+            )
+            seen = state.motion.observations
+            self._viewer.keyframe(KeyframeScene(keyframe, frame, seen, self._slam.labels, loops))
 
     def drive(self, states: Iterable[tuple[int, FrameState | None]], progress: Progress) -> None:
         """Take frame after frame until the last, or until Ctrl-C."""
@@ -147,6 +177,7 @@ class _Session:
         slam = self._slam.finish()
         times = self._clock.read(len(slam.frames), self._stopwatch)
         scores = score_run(self._dataset, self._config, slam, len(self._unreadable), self._interrupted, times)
+        self._viewer.finish(partial(_finished, slam, scores, self._dataset.ground_truth))
         return RunResult(
             config=self._config,
             slam=slam,
@@ -163,6 +194,18 @@ class _Session:
             ),
             notes=(*self._dataset.notes, *self._unreadable, *slam.notes),
         )
+
+
+def _finished(slam: SlamResult, scores: Scores, ground_truth: Trajectory | None) -> FinishedRun:
+    """What a viewer shows in the end."""
+    keyframes, poses = slam.largest_map, slam.solution.poses
+    return FinishedRun(
+        trajectory=scores.trajectory,
+        ground_truth=aligned_truth(ground_truth, scores.trajectory),
+        keyframes={keyframe.id: poses[keyframe.id] for keyframe in keyframes},
+        ledger=scores.ledger,
+        map=join_clouds(keyframes, poses),
+    )
 
 
 class _Clock:

@@ -1,14 +1,14 @@
 """A saved run and its sequence together: its keyframes' images at their optimised poses, read again."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from semslam.datasets import open_dataset
 from semslam.datasets.dataset import Dataset
 from semslam.errors import ResultsError
 from semslam.maps.views import PosedView
-from semslam.runs.recording import read_front_end
+from semslam.runs.recording import Recording, read_front_end
 from semslam.runs.results import SavedRun, read_run
 from semslam.types import FloatArray
 
@@ -35,11 +35,13 @@ class SavedViews:
 
     Attributes:
         run: the run folder's content.
+        recording: what its front end made of the sequence.
         dataset: the sequence it ran on.
         keyframes: in order.
     """
 
     run: SavedRun
+    recording: Recording
     dataset: Dataset
     keyframes: tuple[PlacedKeyframe, ...]
 
@@ -52,7 +54,7 @@ class SavedViews:
         kept = tuple(keyframe for keyframe in self.keyframes if start <= keyframe.timestamp < end)
         if not kept:
             raise ResultsError(f"{self.run.directory} has no keyframe between {start:g} and {end:g} s.")
-        return SavedViews(self.run, self.dataset, kept)
+        return replace(self, keyframes=kept)
 
     def read(self, progress: Progress = silent) -> Iterator[PosedView]:
         """Read the keyframes' images one by one.
@@ -95,4 +97,4 @@ def open_saved(directory: Path, sequence: str | None = None) -> SavedViews:
         )
     except KeyError as error:
         raise ResultsError(f"The keyframes of {directory} are not among its frames; it is damaged.") from error
-    return SavedViews(run, dataset, keyframes)
+    return SavedViews(run, saved.recording, dataset, keyframes)

@@ -20,7 +20,7 @@ from semslam.runtime.stopwatch import Stopwatch
 from semslam.system.recovery import recover_poses
 from semslam.system.refinement import refine
 from semslam.system.result import FrameState, SlamResult
-from semslam.types import FloatArray, Frame, Keyframe, LoopConstraint, Motion, Observations, Verification
+from semslam.types import FloatArray, Frame, Keyframe, LabelMap, LoopConstraint, Motion, Observations, Verification
 
 
 @dataclass(slots=True)
@@ -94,6 +94,16 @@ class Slam:
     def keyframes(self) -> tuple[Keyframe, ...]:
         """The keyframes so far."""
         return tuple(self._keyframes)
+
+    @property
+    def outcomes(self) -> tuple[Verification, ...]:
+        """What the verification made of each candidate so far."""
+        return tuple(self._outcomes)
+
+    @property
+    def labels(self) -> LabelMap | None:
+        """The newest keyframe's segmentation, where the detector needed one."""
+        return None if self._search is None else self._search.labels
 
     def process(self, frame: Frame) -> FrameState:
         """Track a frame and, where it is due, make it a keyframe and look for loops.
