@@ -6,12 +6,11 @@ import numpy.typing as npt
 from semslam.config import KeyframeConfig
 from semslam.geometry.camera import Intrinsics
 from semslam.geometry.se3 import Float32Array
+from semslam.geometry.voxels import voxel_keys
 from semslam.types import Cloud, Frame, UInt8Array
 
 CLOUD_STRIDE = 4
 """Every fourth pixel in both directions goes into a cloud before it is thinned."""
-VOXEL_MASK = (1 << 21) - 1
-"""Bits of a voxel's index along one axis: one whole number then names the voxel."""
 EDGE = 0.04
 """Share of the depth by which neighbours may differ and still lie on one surface."""
 
@@ -52,7 +51,6 @@ def _grid_normals(points: Float32Array) -> tuple[Float32Array, npt.NDArray[np.bo
 
 
 def _thin(points: Float32Array, normals: Float32Array, colors: UInt8Array, voxel: float) -> Cloud:
-    cells = np.floor(points / voxel).astype(np.int64) & VOXEL_MASK
-    _, first = np.unique((cells[:, 0] << 42) | (cells[:, 1] << 21) | cells[:, 2], return_index=True)
+    _, first = np.unique(voxel_keys(points, voxel), return_index=True)
     first.sort()
     return Cloud(points[first], normals[first], colors[first])

@@ -38,6 +38,7 @@ class LoopSearch:
         self._follower = LoopFollower(config)
         self._stopwatch = stopwatch or Stopwatch()
         self._keyframes: list[Keyframe] = []
+        self._labels: LabelMap | None = None
 
     @classmethod
     def from_config(
@@ -63,6 +64,11 @@ class LoopSearch:
         """All keyframes so far; ``keyframes[i].id`` is i."""
         return tuple(self._keyframes)
 
+    @property
+    def labels(self) -> LabelMap | None:
+        """The newest keyframe's segmentation, where the detector needed one."""
+        return self._labels
+
     def search(self, keyframe: Keyframe, frame: Frame, labels: LabelMap | None = None) -> list[Verification]:
         """Take a new keyframe and look for its loops.
 
@@ -77,6 +83,7 @@ class LoopSearch:
         if labels is None and self._segmenter is not None:
             with self._stopwatch.stage("segmentation"):
                 labels = self._segmenter.segment(frame.color, frame.source_index)
+        self._labels = labels
         view = KeyframeView(keyframe, frame.color, frame.depth, labels)
         with self._stopwatch.stage("query"):
             candidates = self._detector.query(view)

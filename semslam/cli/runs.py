@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from semslam.datasets.dataset import Dataset
     from semslam.runs.metrics import Metrics
     from semslam.runs.recording import Recording, SavedFrontEnd
+    from semslam.viewers.viewer import Viewer
 
 RUNS = Path("runs")
 DEMO_SEQUENCE = "synthetic:house"
@@ -24,6 +25,8 @@ DEMO_ODOMETRY = "feature"
 """Frame to frame: it drifts, so it shows what loops bring."""
 
 OutDirectory = Annotated[Path | None, typer.Option("--out", help="The run folder itself (default: runs/...).")]
+Visualize = Annotated[bool, typer.Option("--visualize", help="Start the viewer and show the run as it goes.")]
+RerunFile = Annotated[Path | None, typer.Option("--rerun", help="Write a recording (.rrd) for the viewer.")]
 Plots = Annotated[bool, typer.Option("--plots/--no-plots", help="Draw plots and the report.")]
 
 
@@ -43,6 +46,8 @@ def run_command(
     stride: options.Stride = 1,
     loader: options.Loader = None,
     plots: Plots = True,
+    visualize: Visualize = False,
+    rerun_file: RerunFile = None,
 ) -> None:
     """Run SLAM over a sequence and write a run folder."""
     from semslam.datasets import open_dataset
@@ -60,7 +65,10 @@ def run_command(
         saved.check_settings(chosen)
     dataset = open_dataset(source, config=chosen.dataset)
     directory = out_directory or new_run_directory(RUNS, dataset.name, chosen.detector)
-    metrics = _run_one(dataset, chosen, directory, plots, source, recording)
+    viewer = _viewer(directory.name, rerun_file, visualize)
+    metrics = _run_one(dataset, chosen, directory, plots, source, recording, viewer)
+    if viewer is not None:
+        viewer.close()
     if out_directory is None:
         link_latest(directory)
     out.print(metrics_table([metrics], f"{dataset.name}: {metrics.frames} frames"))
@@ -134,6 +142,15 @@ def _compare(
     return runs
 
 
+def _viewer(name: str, file: Path | None, live: bool) -> "Viewer | None":
+    """The viewer that is asked for; opened before the run, so that what is missing is known at once."""
+    if file is None and not live:
+        return None
+    from semslam.viewers.rerun_stream import open_viewer
+
+    return open_viewer(name, file, live)
+
+
 def _source(sequence: str | None, saved: "SavedFrontEnd | None") -> str:
     """What the dataset is opened by."""
     if sequence is not None:
@@ -152,6 +169,7 @@ def _run_one(
     plots: bool,
     source: str,
     recording: "Recording | None" = None,
+    viewer: "Viewer | None" = None,
 ) -> "Metrics":
     from semslam.runs.pipeline import replay, run
     from semslam.runs.results import check_writable, write_run
@@ -159,7 +177,10 @@ def _run_one(
     check_writable(directory)
     with bar(f"{dataset.name} {config.detector}", len(dataset)) as update:
         progress = frame_progress(update, len(dataset))
-        result = run(dataset, config, progress) if recording is None else replay(dataset, recording, config, progress)
+        if recording is None:
+            result = run(dataset, config, progress, viewer)
+        else:
+            result = replay(dataset, recording, config, progress, viewer=viewer)
     remarks(result.notes)
     try:
         write_run(result, dataset, directory, plots, source)

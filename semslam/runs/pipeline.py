@@ -5,7 +5,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing
 from dataclasses import dataclass
-from functools import partial
+from functools import lru_cache, partial
 
 from semslam.config import Config
 from semslam.datasets.dataset import Dataset
@@ -14,14 +14,17 @@ from semslam.datasets.prefetch import prefetch
 from semslam.errors import DatasetError
 from semslam.eval.trajectory import coverage_remark
 from semslam.loop.verification.verifier import LoopVerifier
+from semslam.maps.cloud import join_clouds
 from semslam.runs.metrics import Metrics, TimeMetrics
 from semslam.runs.recording import RecordedFrame, Recording, checksum
-from semslam.runs.scoring import score_run
+from semslam.runs.scoring import Scores, score_run
 from semslam.runtime.stopwatch import Stopwatch
 from semslam.runtime.workers import WorkerKind
+from semslam.system.closing import KeyframeAnswer
 from semslam.system.result import FrameState, SlamResult
 from semslam.system.slam import Slam
-from semslam.types import LedgerEntry, Trajectory
+from semslam.types import Frame, LedgerEntry, LoopConstraint, Trajectory
+from semslam.viewers.viewer import FinishedRun, KeyframeScene, LoopScene, NoViewer, ShownLoop, Viewer, aligned_truth
 
 Progress = Callable[[int, FrameState | None], None]
 
@@ -62,7 +65,9 @@ class RunResult:
     notes: tuple[str, ...]
 
 
-def run(dataset: Dataset, config: Config | None = None, progress: Progress = _silent) -> RunResult:
+def run(
+    dataset: Dataset, config: Config | None = None, progress: Progress = _silent, viewer: Viewer | None = None
+) -> RunResult:
     """Run SLAM over a dataset.
 
     An unreadable image costs its frame, is counted and noted. Ctrl-C ends the sequence early; what was computed
@@ -72,13 +77,14 @@ def run(dataset: Dataset, config: Config | None = None, progress: Progress = _si
         dataset: the sequence.
         config: settings; the defaults if None.
         progress: called after each frame with its index and its state (None if it was unreadable).
+        viewer: is shown the run as it goes; None = nobody.
 
     Raises:
         ConfigError: a name or setting is unknown.
         ModelError: the network's weights are missing or damaged.
         DatasetError: no frame at all could be read or tracked.
     """
-    with closing(_Session(dataset, config or Config())) as session:
+    with closing(_Session(dataset, config or Config(), viewer=viewer)) as session:
         session.drive(session.track(), progress)
         return session.result()
 
@@ -89,6 +95,7 @@ def replay(
     config: Config,
     progress: Progress = _silent,
     verifier: LoopVerifier | None = None,
+    viewer: Viewer | None = None,
 ) -> RunResult:
     """Repeat detection, verification and back end on a saved front end; images are read at keyframes alone.
 
@@ -100,6 +107,7 @@ def replay(
         config: settings; those of the front end must be the recorded run's (``SavedFrontEnd.check_settings``).
         progress: called after each frame with its index and its state.
         verifier: decides on candidates; none = the built-in one.
+        viewer: is shown the run as it goes; None = nobody.
 
     Raises:
         ConfigError: a name or setting is unknown.
@@ -107,7 +115,7 @@ def replay(
         DatasetError: it is another sequence, or a keyframe's image cannot be read.
     """
     recording.check(dataset)
-    with closing(_Session(dataset, config, verifier)) as session:
+    with closing(_Session(dataset, config, verifier, viewer)) as session:
         session.drive(session.repeat(recording), progress)
         return session.result()
 
@@ -115,10 +123,18 @@ def replay(
 class _Session:
     """A run between its first frame and its result."""
 
-    def __init__(self, dataset: Dataset, config: Config, verifier: LoopVerifier | None = None) -> None:
+    def __init__(
+        self,
+        dataset: Dataset,
+        config: Config,
+        verifier: LoopVerifier | None = None,
+        viewer: Viewer | None = None,
+    ) -> None:
         self._dataset, self._config = dataset, config
+        self._viewer = viewer or NoViewer()
         self._stopwatch, self._clock = Stopwatch(), _Clock()
-        self._slam = Slam.from_config(config, self._stopwatch, verifier, _worker(config, len(dataset)))
+        worker = _worker(config, len(dataset))
+        self._slam = Slam.from_config(config, self._stopwatch, verifier, worker, self._show_answer)
         self._unreadable: list[str] = []
         self._checksum = 0
         self._interrupted = False
@@ -131,15 +147,33 @@ class _Session:
                 yield index, None
             else:
                 self._checksum = self._checksum or checksum(item)
-                yield index, self._slam.process(item)
+                state = self._slam.process(item)
+                self._show(state, item)
+                yield index, state
 
     def repeat(self, recording: Recording) -> Iterator[tuple[int, FrameState]]:
         """Take each frame's motion from a recording."""
         self._unreadable.extend(recording.unreadable)
         self._checksum, self._interrupted = recording.checksum, recording.interrupted
         for frame in recording.frames:
-            read = partial(self._dataset.frame, frame.index)
-            yield frame.index, self._slam.advance(frame.index, frame.timestamp, frame.motion, read)
+            read = lru_cache(maxsize=1)(partial(self._dataset.frame, frame.index))
+            state = self._slam.advance(frame.index, frame.timestamp, frame.motion, read)
+            self._show(state, None if state.keyframe is None else read())
+            yield frame.index, state
+
+    def _show(self, state: FrameState, frame: Frame | None) -> None:
+        """Show the viewer a frame; its images are at hand at keyframes at least."""
+        self._viewer.track(frame, state)
+        if state.keyframe is not None and frame is not None:
+            keyframe = self._slam.keyframes[-1]
+            self._viewer.keyframe(KeyframeScene(keyframe, frame, state.motion.observations))
+
+    def _show_answer(self, answer: KeyframeAnswer) -> None:
+        """Show the viewer what became of a keyframe."""
+        loops = tuple(
+            ShownLoop(v.candidate.query, v.candidate.match, isinstance(v, LoopConstraint)) for v in answer.verifications
+        )
+        self._viewer.loops(LoopScene(self._slam.keyframes[answer.keyframe], answer.labels, loops))
 
     def close(self) -> None:
         """End what runs beside tracking."""
@@ -160,6 +194,7 @@ class _Session:
         slam = self._slam.finish()
         times = self._clock.read(len(slam.frames), self._stopwatch)
         scores = score_run(self._dataset, self._config, slam, len(self._unreadable), self._interrupted, times)
+        self._viewer.finish(partial(_finished, slam, scores, self._dataset.ground_truth))
         return RunResult(
             config=self._config,
             slam=slam,
@@ -190,6 +225,18 @@ def _worker(config: Config, frames: int) -> WorkerKind:
     if config.loops.worker == "auto":
         return WorkerKind.PROCESS if frames >= LONG_SEQUENCE else WorkerKind.NONE
     return WorkerKind(config.loops.worker)
+
+
+def _finished(slam: SlamResult, scores: Scores, ground_truth: Trajectory | None) -> FinishedRun:
+    """What a viewer shows in the end."""
+    keyframes, poses = slam.largest_map, slam.solution.poses
+    return FinishedRun(
+        trajectory=scores.trajectory,
+        ground_truth=aligned_truth(ground_truth, scores.trajectory),
+        keyframes={keyframe.id: poses[keyframe.id] for keyframe in keyframes},
+        ledger=scores.ledger,
+        map=join_clouds(keyframes, poses),
+    )
 
 
 class _Clock:

@@ -1,7 +1,7 @@
 """What happens at a keyframe besides tracking: loops are searched, and the live graph takes them in."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 from semslam.backend.graph.products import Edge
@@ -12,7 +12,7 @@ from semslam.loop.search import LoopSearch
 from semslam.loop.verification.verifier import LoopVerifier
 from semslam.runtime.stopwatch import Stopwatch
 from semslam.runtime.workers import Worker, WorkerKind, make_worker
-from semslam.types import FloatArray, Frame, Keyframe, LoopConstraint, Verification
+from semslam.types import FloatArray, Frame, Keyframe, LabelMap, LoopConstraint, Verification
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,6 +42,7 @@ class KeyframeAnswer:
         T_world_odom: (4, 4) takes poses of the keyframe's map from odometry's frame to the world as the loops have it.
         accepted: match and query of the loops that the live graph follows from this keyframe on.
         withdrawn: the same of those that it no longer follows.
+        labels: the keyframe's segmentation without confidences, where one was made.
         seconds: time of each call, by stage.
     """
 
@@ -50,6 +51,7 @@ class KeyframeAnswer:
     T_world_odom: FloatArray
     accepted: tuple[tuple[int, int], ...]
     withdrawn: tuple[tuple[int, int], ...]
+    labels: LabelMap | None
     seconds: Mapping[str, Sequence[float]]
 
 
@@ -88,7 +90,13 @@ class LoopClosing:
             change = self._graph.update()
             T_world_odom = self._graph.correction(keyframe.id)
         return KeyframeAnswer(
-            keyframe.id, verifications, T_world_odom, change.accepted, change.withdrawn, self._stopwatch.take()
+            keyframe=keyframe.id,
+            verifications=verifications,
+            T_world_odom=T_world_odom,
+            accepted=change.accepted,
+            withdrawn=change.withdrawn,
+            labels=None if self._search.labels is None else replace(self._search.labels, confidence=None),
+            seconds=self._stopwatch.take(),
         )
 
 

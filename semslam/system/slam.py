@@ -53,6 +53,7 @@ class Slam:
         graph: joins motions and loops for the final solution.
         config: settings of the back end.
         stopwatch: collects stage times.
+        listener: is handed each keyframe's answer when it is taken in, such as for a viewer.
     """
 
     def __init__(
@@ -63,6 +64,7 @@ class Slam:
         graph: PoseGraph,
         config: Config,
         stopwatch: Stopwatch,
+        listener: Callable[[KeyframeAnswer], None] = lambda answer: None,
     ) -> None:
         self._odometry = odometry
         self._builder = builder
@@ -70,6 +72,7 @@ class Slam:
         self._graph = graph
         self._config = config
         self._stopwatch = stopwatch
+        self._listener = listener
         self._anchors: dict[int, _Anchor] = {}
         self._frames: list[FrameState] = []
         self._keyframes: list[Keyframe] = []
@@ -87,6 +90,7 @@ class Slam:
         stopwatch: Stopwatch | None = None,
         verifier: LoopVerifier | None = None,
         worker: WorkerKind = WorkerKind.NONE,
+        listener: Callable[[KeyframeAnswer], None] = lambda answer: None,
     ) -> Self:
         """Build every part by its registered name.
 
@@ -95,6 +99,7 @@ class Slam:
             stopwatch: collects stage times.
             verifier: decides on candidates; None = the registered one.
             worker: where loops are closed; in a thread or process of its own tracking does not wait for them.
+            listener: is handed each keyframe's answer when it is taken in.
 
         Raises:
             ConfigError: a name is unknown.
@@ -108,6 +113,7 @@ class Slam:
             graph=PoseGraph(config.backend),
             config=config,
             stopwatch=stopwatch or Stopwatch(),
+            listener=listener,
         )
 
     @property
@@ -224,6 +230,7 @@ class Slam:
         """Take in the answers for all keyframes but the last ``leave``, waiting for them where they are not there."""
         while len(self._pending) > leave:
             answer = self._pending.popleft().result()
+            self._listener(answer)
             self._stopwatch.add(answer.seconds)
             self._outcomes += answer.verifications
             for verification in answer.verifications:

@@ -1,0 +1,170 @@
+"""How right the semantic map of a rendered scene is, and what a comparison of two passes finds.
+
+    semslam run "synthetic:house" --out RUN --no-plots
+    python benchmarks/maps.py labels RUN...
+
+``labels`` prints the mean IoU over the classes present of single views and of the fused map, against the renderer's
+true labels, twice: over the pixels of all keyframes (each pixel takes the label of the voxel it falls into, so both
+rows are of the same pixels), and over the map's points (a point's true label is that of most pixels that fell into
+it; a single view then gives each of its pixels' labels to their points). Then the objects. The true ones are those
+that the same search finds in a map of true labels and true poses. One is found if an object of its class lies within
+0.3 m of its centroid, misplaced if within 1 m, else missed; objects of the run that no true one takes are invented.
+"""
+
+import argparse
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from semslam.datasets.synthetic import SyntheticDataset
+from semslam.eval.trajectory import associate, fit_alignment
+from semslam.geometry.voxels import voxel_keys
+from semslam.loop.segmentation.build import build_segmenter
+from semslam.loop.segmentation.classes import NYU40_NAMES
+from semslam.loop.segmentation.training.evaluation import confusion_matrix, score
+from semslam.maps.semantic.objects import MapObject
+from semslam.maps.semantic.semantic_map import SemanticMap, build_semantic_map
+from semslam.maps.views import PosedView, sample
+from semslam.runs.saved_views import SavedViews, open_saved
+from semslam.types import FloatArray, IntArray, LabelMap, UInt8Array
+
+NEAR, FAR = 0.3, 1.0
+"""Metres between centroids up to which an object is found, and up to which it is misplaced."""
+
+
+class Remembered:
+    """A segmenter that keeps what it answered, by frame."""
+
+    def __init__(self, saved: SavedViews) -> None:
+        self._segmenter = build_segmenter(saved.run.config)
+        self.name, self.names, self.fingerprint = "remembered", self._segmenter.names, ""
+        self.kept: dict[int, UInt8Array] = {}
+
+    def segment(self, color: UInt8Array, frame_index: int | None = None) -> LabelMap:
+        """Ask, and keep the labels."""
+        answer = self._segmenter.segment(color, frame_index)
+        self.kept[frame_index or 0] = answer.labels
+        return answer
+
+
+class TrueLabels:
+    """The renderer's labels in a segmenter's place."""
+
+    def __init__(self, dataset: SyntheticDataset) -> None:
+        self.name, self.names, self.fingerprint = "true", NYU40_NAMES, ""
+        self._dataset = dataset
+        self.kept: dict[int, UInt8Array] = {}
+
+    def segment(self, color: UInt8Array, frame_index: int | None = None) -> LabelMap:
+        """Render the labels of a frame, or give those rendered before."""
+        index = frame_index or 0
+        if index not in self.kept:
+            self.kept[index] = self._dataset.labels(index)
+        return LabelMap(self.kept[index], self.names)
+
+
+@dataclass(frozen=True)
+class Objects:
+    """Counts of true objects by what became of them, and of objects that are none."""
+
+    found: int
+    misplaced: int
+    missed: int
+    invented: int
+
+
+def rows_of(built: SemanticMap, points: FloatArray) -> IntArray:
+    """The map's row of each point (N, 3) that its views were made of."""
+    order = np.argsort(built.keys)
+    return order[np.searchsorted(built.keys[order], voxel_keys(points, built.voxel))]
+
+
+def labels_table(built: SemanticMap, views: Sequence[PosedView], single: Remembered, truth: TrueLabels) -> None:
+    """Print mIoU and accuracy of single views and of the map."""
+    votes = np.zeros((len(built.cloud), len(built.names)), dtype=np.int64)
+    pixels_alone, pixels_map = np.zeros((2, len(built.names), len(built.names)), dtype=np.int64)
+    seen = []
+    for view in views:
+        samples = sample(view)
+        rows = rows_of(built, samples.points)
+        true, alone = truth.kept[view.frame.index][samples.mask], single.kept[view.frame.index][samples.mask]
+        np.add.at(votes, (rows, true), 1)
+        pixels_alone += confusion_matrix(true, alone)
+        pixels_map += confusion_matrix(true, built.labels[rows])
+        seen.append((rows, alone))
+    of_points = votes.argmax(axis=1).astype(np.uint8)
+    points_alone = sum(confusion_matrix(of_points[rows], alone) for rows, alone in seen)
+    points_map = confusion_matrix(of_points, built.labels)
+    print("| over | single views: mIoU | accuracy | map: mIoU | accuracy | gain, points of mIoU |")
+    print("|---|---|---|---|---|---|")
+    for name, alone, fused in (("pixels", pixels_alone, pixels_map), ("map points", points_alone, points_map)):
+        a, b = score(alone), score(fused)
+        print(
+            f"| {name} | {a.miou:.3f} | {a.pixel_accuracy:.3f} | {b.miou:.3f} | {b.pixel_accuracy:.3f} "
+            f"| {100 * (b.miou - a.miou):+.1f} |"
+        )
+    right = built.labels == of_points
+    for low, high in ((0.0, 0.5), (0.5, 0.8), (0.8, 0.95), (0.95, 1.01)):
+        inside = (built.confidence >= low) & (built.confidence < high)
+        if inside.any():
+            print(
+                f"confidence {low:.2f} to {min(high, 1):.2f}: {inside.sum()} points, "
+                f"mean {built.confidence[inside].mean():.2f}, right {right[inside].mean():.2f}"
+            )
+
+
+def compare_objects(found: Sequence[MapObject], true: Sequence[MapObject], T: FloatArray) -> Objects:
+    """Match objects of the run, moved by ``T`` (4, 4) into the true world, to the true ones, the nearest first."""
+    pairs = [
+        (float(np.linalg.norm(T[:3, :3] @ a.centroid + T[:3, 3] - b.centroid)), a.id, b.id)
+        for a in found
+        for b in true
+        if a.name == b.name
+    ]
+    taken: dict[int, float] = {}
+    used: set[int] = set()
+    for distance, a, b in sorted(pairs):
+        if distance <= FAR and a not in used and b not in taken:
+            taken[b] = distance
+            used.add(a)
+    near = sum(distance <= NEAR for distance in taken.values())
+    return Objects(near, len(taken) - near, len(true) - len(taken), len(found) - len(used))
+
+
+def labels(directory: Path) -> None:
+    """All figures of one run's semantic map."""
+    saved = open_saved(directory)
+    dataset = saved.dataset
+    assert isinstance(dataset, SyntheticDataset)
+    views = list(saved.read())
+    single, truth = Remembered(saved), TrueLabels(dataset)
+    built = build_semantic_map(views, single)
+    stamps = np.searchsorted(dataset.timestamps, [v.frame.timestamp for v in views])
+    exact = [PosedView(v.keyframe, v.frame, dataset.ground_truth.poses[i]) for v, i in zip(views, stamps, strict=True)]
+    ideal = build_semantic_map(exact, truth)
+    print(f"\n{directory}: {len(views)} keyframes, {len(built.cloud)} points\n")
+    labels_table(built, views, single, truth)
+    T = fit_alignment(associate(saved.run.keyframes, dataset.ground_truth)).T
+    counts = compare_objects(built.objects, ideal.objects, T)
+    print(f"\nObjects, {len(ideal.objects)} true: {counts}")
+    by_class = Counter(thing.name for thing in ideal.objects)
+    for name, count in by_class.most_common():
+        some = [[thing for thing in things if thing.name == name] for things in (built.objects, ideal.objects)]
+        print(f"  {name} ({count}): {compare_objects(*some, T)}")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    commands = parser.add_subparsers(dest="command", required=True)
+    one = commands.add_parser("labels")
+    one.add_argument("runs", nargs="+", type=Path)
+    arguments = parser.parse_args()
+    for directory in arguments.runs:
+        labels(directory)
+
+
+if __name__ == "__main__":
+    main()

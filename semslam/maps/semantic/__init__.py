@@ -1,0 +1,1 @@
+"""The semantic map: labels fused over views, and the objects in it."""

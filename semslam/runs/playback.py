@@ -1,0 +1,66 @@
+"""A saved run shown again, as it went."""
+
+from collections import defaultdict
+from collections.abc import Sequence
+
+from semslam.frontend.keyframes import KeyframeBuilder
+from semslam.loop.segmentation.build import build_segmenter
+from semslam.maps.cloud import join_clouds
+from semslam.runs.recording import RecordedFrame
+from semslam.runs.saved_views import Progress, SavedViews, silent
+from semslam.system.result import FrameState
+from semslam.types import FloatArray, Keyframe, LoopOutcome
+from semslam.viewers.viewer import FinishedRun, KeyframeScene, LoopScene, ShownLoop, Viewer, aligned_truth
+
+
+def play(saved: SavedViews, viewer: Viewer, progress: Progress = silent) -> None:
+    """Show a saved run to a viewer: the odometry's poses frame by frame, images at keyframes, and what came out.
+
+    The images are read again and labelled by the segmenter of the run's settings.
+
+    Args:
+        saved: the run and its images.
+        viewer: is shown them.
+        progress: called with the frames done and in all.
+
+    Raises:
+        DatasetError: an image can no longer be read.
+        ModelError: the network's weights cannot be used.
+    """
+    builder = KeyframeBuilder(saved.run.config, details=False)
+    segmenter = build_segmenter(saved.run.config)
+    loops = defaultdict(list)
+    for entry in saved.run.ledger:
+        verified = entry.verdict is not LoopOutcome.REJECTED
+        loops[entry.query].append(ShownLoop(entry.query, entry.match, verified))
+    keyframes = []
+    for done, recorded in enumerate(saved.recording.frames, start=1):
+        motion = recorded.motion
+        if not builder.advance(recorded.index, recorded.timestamp, motion):
+            viewer.track(None, _state(recorded, builder.pose.T_odom_cam, None))
+        else:
+            frame = saved.dataset.frame(recorded.index)
+            keyframe = builder.build(frame)
+            viewer.track(frame, _state(recorded, keyframe.T_odom_cam, keyframe.id))
+            viewer.keyframe(KeyframeScene(keyframe, frame, motion.observations))
+            labels = segmenter.segment(frame.color, frame.source_index)
+            viewer.loops(LoopScene(keyframe, labels, loops[keyframe.id]))
+            keyframes.append(keyframe)
+        progress(done, len(saved.recording.frames))
+    viewer.finish(lambda: _finished(saved, keyframes))
+
+
+def _state(recorded: RecordedFrame, T_odom_cam: FloatArray, keyframe: int | None) -> FrameState:
+    """A frame as odometry had it; the loops of a saved run are shown with its final trajectory."""
+    return FrameState(recorded.index, recorded.timestamp, recorded.motion, T_odom_cam, T_odom_cam, keyframe)
+
+
+def _finished(saved: SavedViews, keyframes: Sequence[Keyframe]) -> FinishedRun:
+    poses = {keyframe.id: keyframe.T_world_cam for keyframe in saved.keyframes}
+    return FinishedRun(
+        trajectory=saved.run.trajectory,
+        ground_truth=aligned_truth(saved.run.ground_truth, saved.run.trajectory),
+        keyframes=poses,
+        ledger=saved.run.ledger,
+        map=join_clouds([keyframe for keyframe in keyframes if keyframe.id in poses], poses),
+    )

@@ -1,0 +1,100 @@
+"""A saved run and its sequence together: its keyframes' images at their optimised poses, read again."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from semslam.datasets import open_dataset
+from semslam.datasets.dataset import Dataset
+from semslam.errors import ResultsError
+from semslam.maps.views import PosedView
+from semslam.runs.recording import Recording, read_front_end
+from semslam.runs.results import SavedRun, read_run
+from semslam.types import FloatArray
+
+Progress = Callable[[int, int], None]
+
+
+def silent(done: int, whole: int) -> None:
+    """Report nothing."""
+
+
+@dataclass(frozen=True, slots=True)
+class PlacedKeyframe:
+    """A keyframe of the largest map: its id, its frame in the sequence, its stamp in seconds and its pose (4, 4)."""
+
+    id: int
+    frame: int
+    timestamp: float
+    T_world_cam: FloatArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SavedViews:
+    """The keyframes of a saved run's largest map, with their sequence.
+
+    Attributes:
+        run: the run folder's content.
+        recording: what its front end made of the sequence.
+        dataset: the sequence it ran on.
+        keyframes: in order.
+    """
+
+    run: SavedRun
+    recording: Recording
+    dataset: Dataset
+    keyframes: tuple[PlacedKeyframe, ...]
+
+    def between(self, start: float, end: float) -> "SavedViews":
+        """Those of its keyframes whose stamps lie in [start, end), seconds.
+
+        Raises:
+            ResultsError: there is none.
+        """
+        kept = tuple(keyframe for keyframe in self.keyframes if start <= keyframe.timestamp < end)
+        if not kept:
+            raise ResultsError(f"{self.run.directory} has no keyframe between {start:g} and {end:g} s.")
+        return replace(self, keyframes=kept)
+
+    def read(self, progress: Progress = silent) -> Iterator[PosedView]:
+        """Read the keyframes' images one by one.
+
+        Args:
+            progress: called with the keyframes done and in all.
+
+        Raises:
+            DatasetError: an image can no longer be read.
+        """
+        for done, keyframe in enumerate(self.keyframes, start=1):
+            yield PosedView(keyframe.id, self.dataset.frame(keyframe.frame), keyframe.T_world_cam)
+            progress(done, len(self.keyframes))
+
+
+def open_saved(directory: Path, sequence: str | None = None) -> SavedViews:
+    """Open a saved run together with its sequence.
+
+    Args:
+        directory: the run folder.
+        sequence: where the images are now; None = where they were.
+
+    Raises:
+        ResultsError: it is no run folder, it is damaged, or it does not know where its images are.
+        DatasetError: the images are not there, or they are those of another sequence.
+    """
+    run, saved = read_run(directory), read_front_end(directory)
+    source = sequence or saved.source
+    if source is None:
+        raise ResultsError(f"{directory} does not say where its images are; name the sequence with --sequence.")
+    dataset = open_dataset(source, config=run.config.dataset)
+    saved.recording.check(dataset)
+    # Trajectory files keep nine decimals of a stamp.
+    frames = {round(frame.timestamp, 9): frame.index for frame in saved.recording.frames}
+    ids = {round(stamp, 9): id for id, stamp in run.keyframe_stamps.items()}
+    try:
+        keyframes = tuple(
+            PlacedKeyframe(ids[round(stamp, 9)], frames[round(stamp, 9)], stamp, pose)
+            for stamp, pose in zip(run.keyframes.timestamps.tolist(), run.keyframes.poses, strict=True)
+        )
+    except KeyError as error:
+        raise ResultsError(f"The keyframes of {directory} are not among its frames; it is damaged.") from error
+    return SavedViews(run, saved.recording, dataset, keyframes)

@@ -1,0 +1,41 @@
+"""Opening a Rerun recording: into a file, into a viewer that is started, or both."""
+
+from pathlib import Path
+
+from semslam.errors import ConfigError, ResultsError
+from semslam.viewers.rerun_blueprint import make_blueprint
+from semslam.viewers.rerun_viewer import RerunViewer
+
+APPLICATION = "semslam"
+
+
+def open_viewer(name: str, file: Path | None, live: bool) -> RerunViewer:
+    """Open a viewer.
+
+    Args:
+        name: what the recording is called in the viewer.
+        file: the .rrd file that is written, or None.
+        live: whether to start the viewer and stream into it.
+
+    Raises:
+        ConfigError: rerun-sdk is not installed.
+        ResultsError: the file cannot be written, or the viewer does not start.
+    """
+    try:
+        import rerun as rr
+    except ImportError as error:
+        raise ConfigError("The viewer needs the package rerun-sdk: pip install 'semslam[rerun]'.") from error
+    stream = rr.RecordingStream(APPLICATION)
+    sinks: list[rr.FileSink | rr.GrpcSink] = []
+    try:
+        if live:
+            rr.spawn(connect=False)
+            sinks.append(rr.GrpcSink())
+        if file is not None:
+            file.parent.mkdir(parents=True, exist_ok=True)
+            sinks.append(rr.FileSink(file))
+        stream.set_sinks(*sinks, default_blueprint=make_blueprint())
+    except (OSError, RuntimeError) as error:
+        raise ResultsError(f"The viewer cannot be opened: {' '.join(str(error).split())}.") from error
+    stream.send_recording_name(name)
+    return RerunViewer(stream)

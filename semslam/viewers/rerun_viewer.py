@@ -1,0 +1,191 @@
+"""A run shown in Rerun (https://rerun.io)."""
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+import cv2
+import numpy as np
+
+from semslam.eval.style import LOOKS, ODOMETRY, OPTIMISED, TRUTH, LoopKind
+from semslam.geometry.se3 import transform_points
+from semslam.loop.detectors.semantic.nodes import extract_nodes
+from semslam.loop.detectors.semantic.settings import NodeConfig
+from semslam.loop.segmentation.classes import PALETTE
+from semslam.system.result import FrameState
+from semslam.types import (
+    FloatArray,
+    Frame,
+    Intrinsics,
+    LabelMap,
+    LedgerEntry,
+    LoopOutcome,
+    Observations,
+)
+from semslam.viewers.rerun_blueprint import CAMERA, FINAL, IMAGE, LIVE, TRACKING
+from semslam.viewers.viewer import FinishedRun, KeyframeScene, LoopScene, ShownLoop
+
+if TYPE_CHECKING:
+    from rerun import RecordingStream
+
+JPEG_QUALITY = 75
+MILLIMETRES = 1000.0
+FRUSTUM = 0.25
+"""Metres from the camera's centre at which its image is drawn."""
+MIN_NODE_AREA = 0.002
+"""Share of the image; smaller blocks are not shown as nodes."""
+
+
+class RerunViewer:
+    """Logs a run into a recording.
+
+    Entities lie below ``world/live`` (what is known while the run goes on, in the odometry's world), ``world/final``
+    (what came out) and ``tracking`` (numbers over time), on the timelines ``frame`` and ``time``.
+
+    Args:
+        stream: the open recording.
+    """
+
+    def __init__(self, stream: "RecordingStream") -> None:
+        self._stream = stream
+        self._last: FrameState | None = None
+        self._positions: list[FloatArray] = []
+        self._landmarks: set[int] = set()
+        self._unlabelled: dict[int, Frame] = {}
+        self._intrinsics: Intrinsics | None = None
+        self._names: tuple[str, ...] | None = None
+
+    def track(self, frame: Frame | None, state: FrameState) -> None:
+        """See ``Viewer``."""
+        import rerun as rr
+
+        self._stream.set_time("frame", sequence=state.index)
+        self._stream.set_time("time", timestamp=state.timestamp)
+        T = state.T_odom_cam
+        self._stream.log(CAMERA, rr.Transform3D(translation=T[:3, 3], mat3x3=T[:3, :3]))
+        if self._last is not None and self._last.map_id == state.map_id:
+            step = np.stack([self._last.T_odom_cam[:3, 3], T[:3, 3]])
+            self._stream.log(f"{LIVE}/path", rr.LineStrips3D([step], colors=_rgb(ODOMETRY)))
+        self._last = state
+        self._stream.log(f"{TRACKING}/inliers", rr.Scalars(state.motion.inliers))
+        if frame is not None:
+            self._show_camera(frame.intrinsics)
+            self._stream.log(f"{IMAGE}/color", rr.Image(frame.color).compress(jpeg_quality=JPEG_QUALITY))
+
+    def keyframe(self, scene: KeyframeScene) -> None:
+        """See ``Viewer``."""
+        import rerun as rr
+
+        T = scene.keyframe.T_odom_cam
+        self._positions.append(T[:3, 3])
+        depth = np.rint(scene.frame.depth * MILLIMETRES).clip(0, 65535).astype(np.uint16)
+        png = cv2.imencode(".png", depth, [cv2.IMWRITE_PNG_COMPRESSION, 1])[1].tobytes()
+        self._stream.log(f"{IMAGE}/depth", rr.EncodedDepthImage(blob=png, media_type="image/png", meter=MILLIMETRES))
+        cloud = scene.keyframe.cloud
+        self._stream.log(
+            f"{LIVE}/cloud",
+            rr.Points3D(transform_points(T, cloud.points), colors=cloud.colors, radii=rr.Radius.ui_points(1)),
+        )
+        if scene.observations is not None:
+            self._show_landmarks(scene.observations, scene.keyframe.intrinsics, T)
+        self._unlabelled[scene.keyframe.id] = scene.frame
+
+    def loops(self, scene: LoopScene) -> None:
+        """See ``Viewer``."""
+        frame = self._unlabelled.pop(scene.keyframe.id)
+        if scene.labels is not None:
+            self._show_labels(scene.labels, frame, scene.keyframe.T_odom_cam)
+        self._show_loops(scene.loops)
+
+    def finish(self, finished: Callable[[], FinishedRun]) -> None:
+        """See ``Viewer``."""
+        self._show_final(finished())
+
+    def _show_final(self, finished: FinishedRun) -> None:
+        import rerun as rr
+
+        self._final("trajectory", rr.LineStrips3D([finished.trajectory.poses[:, :3, 3]], colors=_rgb(OPTIMISED)))
+        if finished.ground_truth is not None:
+            self._final("ground_truth", rr.LineStrips3D([finished.ground_truth.poses[:, :3, 3]], colors=_rgb(TRUTH)))
+        places = {key: T[:3, 3] for key, T in finished.keyframes.items()}
+        self._final("keyframes", rr.Points3D(list(places.values()), colors=_rgb(OPTIMISED), radii=0.02))
+        self._final("map", rr.Points3D(finished.map.points, colors=finished.map.colors, radii=rr.Radius.ui_points(1.5)))
+        for outcome in LoopOutcome:
+            self._final(f"loops/{outcome.value}", _lines(finished.ledger, outcome, places))
+
+    def close(self) -> None:
+        """See ``Viewer``."""
+        self._stream.flush()
+        self._stream.disconnect()
+
+    def _final(self, name: str, what: object) -> None:
+        self._stream.log(f"{FINAL}/{name}", what, static=True)  # type: ignore[arg-type]
+
+    def _show_camera(self, camera: Intrinsics) -> None:
+        if camera == self._intrinsics:
+            return
+        import rerun as rr
+
+        self._intrinsics = camera
+        size = (camera.width, camera.height)
+        pinhole = rr.Pinhole(image_from_camera=camera.matrix, resolution=size, image_plane_distance=FRUSTUM)
+        self._stream.log(IMAGE, pinhole, static=True)
+        self._stream.log("world", rr.ViewCoordinates.RIGHT_HAND_Y_DOWN, static=True)
+
+    def _show_landmarks(self, seen: Observations, camera: Intrinsics, T_odom_cam: FloatArray) -> None:
+        """Show landmarks where they are seen first."""
+        import rerun as rr
+
+        new = np.array([id not in self._landmarks for id in seen.landmarks.tolist()], dtype=bool) & (seen.depths > 0)
+        self._landmarks.update(seen.landmarks[new].tolist())
+        z = seen.depths[new].astype(np.float64)
+        rays = (seen.pixels[new] - (camera.cx, camera.cy)) / (camera.fx, camera.fy)
+        points = transform_points(T_odom_cam, np.column_stack([rays * z[:, None], z]))
+        self._stream.log(f"{LIVE}/landmarks", rr.Points3D(points, colors=(255, 196, 0), radii=rr.Radius.ui_points(2)))
+        self._stream.log(f"{TRACKING}/landmarks", rr.Scalars(len(seen.landmarks)))
+
+    def _show_labels(self, labels: LabelMap, frame: Frame, T_odom_cam: FloatArray) -> None:
+        import rerun as rr
+
+        if self._names != labels.names:
+            self._names = labels.names
+            colors = PALETTE[np.arange(len(labels.names)) % len(PALETTE)]
+            classes = [(i, name, tuple(colors[i].tolist())) for i, name in enumerate(labels.names)]
+            self._stream.log("world", rr.AnnotationContext(classes), static=True)
+        self._stream.log(f"{IMAGE}/labels", rr.SegmentationImage(labels.labels))
+        nodes = extract_nodes(labels, frame.depth, NodeConfig(min_area=MIN_NODE_AREA))
+        self._stream.log(f"{IMAGE}/nodes", rr.Points2D(nodes.uvd[:, :2], class_ids=nodes.labels, radii=4))
+        near = nodes.uvd[:, 2] > 0
+        z = nodes.uvd[near, 2:]
+        camera = frame.intrinsics
+        rays = (camera.undistort_pixels(nodes.uvd[near, :2]) - (camera.cx, camera.cy)) / (camera.fx, camera.fy)
+        points = transform_points(T_odom_cam, np.column_stack([rays * z, z]))
+        self._stream.log(
+            f"{LIVE}/nodes", rr.Points3D(points, class_ids=nodes.labels[near], radii=0.03, show_labels=False)
+        )
+
+    def _show_loops(self, loops: Sequence[ShownLoop]) -> None:
+        import rerun as rr
+
+        for name, kind, verified in (("verified", LoopKind.ACCEPTED, True), ("rejected", LoopKind.REJECTED, False)):
+            kept = [loop for loop in loops if loop.verified is verified]
+            if kept:
+                strips = np.array([(self._positions[loop.match], self._positions[loop.query]) for loop in kept])
+                self._stream.log(f"{LIVE}/loops/{name}", rr.LineStrips3D(strips, colors=_rgb(LOOKS[kind].color)))
+            self._stream.log(f"{TRACKING}/loops_{name}", rr.Scalars(len(kept)))
+
+
+def _lines(ledger: Sequence[LedgerEntry], outcome: LoopOutcome, places: dict[int, FloatArray]) -> object:
+    """Lines between the keyframes of all candidates of one outcome, with what is known of each."""
+    import rerun as rr
+
+    entries = [e for e in ledger if e.verdict is outcome and e.query in places and e.match in places]
+    strips = [np.stack([places[e.match], places[e.query]]) for e in entries]
+    labels = [f"{e.match} - {e.query}: {e.reason or e.detector} {e.score:.2f}" for e in entries]
+    color = _rgb(LOOKS[LoopKind(outcome.value)].color)
+    return rr.LineStrips3D(strips, colors=color, labels=labels, show_labels=False)
+
+
+def _rgb(color: str) -> tuple[int, int, int]:
+    """The colour that ``#rrggbb`` names."""
+    r, g, b = bytes.fromhex(color[1:])
+    return r, g, b

@@ -1,0 +1,116 @@
+"""The role of a viewer, and the one that shows nothing."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from semslam.errors import TrajectoryError
+from semslam.eval.trajectory import align
+from semslam.system.result import FrameState
+from semslam.types import Cloud, FloatArray, Frame, Keyframe, LabelMap, LedgerEntry, Observations, Trajectory
+
+
+@dataclass(frozen=True, slots=True)
+class ShownLoop:
+    """A loop candidate: the keyframes it joins, and whether it passed the verification."""
+
+    query: int
+    match: int
+    verified: bool
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class KeyframeScene:
+    """A new keyframe.
+
+    Attributes:
+        keyframe: the new one.
+        frame: its images.
+        observations: landmarks that the odometry saw in it, where it keeps any.
+    """
+
+    keyframe: Keyframe
+    frame: Frame
+    observations: Observations | None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LoopScene:
+    """What loop closing made of a keyframe, known some frames after it.
+
+    Attributes:
+        keyframe: that one.
+        labels: its segmentation, where one was made.
+        loops: its loop candidates.
+    """
+
+    keyframe: Keyframe
+    labels: LabelMap | None
+    loops: Sequence[ShownLoop]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FinishedRun:
+    """What is shown of a run after its last frame; all of it in the run's world.
+
+    Attributes:
+        trajectory: the final one.
+        ground_truth: moved onto the trajectory, or None.
+        keyframes: final poses (4, 4) by id, of the largest map.
+        ledger: one entry per loop candidate.
+        map: the map's points with colours.
+    """
+
+    trajectory: Trajectory
+    ground_truth: Trajectory | None
+    keyframes: Mapping[int, FloatArray]
+    ledger: Sequence[LedgerEntry]
+    map: Cloud
+
+
+class Viewer(Protocol):
+    """Is shown a run as it goes. Nothing that it does may change the run."""
+
+    def track(self, frame: Frame | None, state: FrameState) -> None:
+        """Show a frame that was tracked; its images where they are at hand."""
+
+    def keyframe(self, scene: KeyframeScene) -> None:
+        """Show a new keyframe, after its frame."""
+
+    def loops(self, scene: LoopScene) -> None:
+        """Show what loop closing made of a keyframe."""
+
+    def finish(self, finished: Callable[[], FinishedRun]) -> None:
+        """Show what came out in the end, which is put together where it is asked for."""
+
+    def close(self) -> None:
+        """Write what is still to be written."""
+
+
+class NoViewer:
+    """Shows nothing."""
+
+    def track(self, frame: Frame | None, state: FrameState) -> None:
+        """Do nothing."""
+
+    def keyframe(self, scene: KeyframeScene) -> None:
+        """Do nothing."""
+
+    def loops(self, scene: LoopScene) -> None:
+        """Do nothing."""
+
+    def finish(self, finished: Callable[[], FinishedRun]) -> None:
+        """Do nothing."""
+
+    def close(self) -> None:
+        """Do nothing."""
+
+
+def aligned_truth(ground_truth: Trajectory | None, trajectory: Trajectory) -> Trajectory | None:
+    """The ground truth moved rigidly onto a trajectory; None where too few of its poses have one."""
+    if ground_truth is None:
+        return None
+    try:
+        return align(ground_truth, trajectory)
+    except TrajectoryError:
+        return None

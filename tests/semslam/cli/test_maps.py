@@ -1,0 +1,59 @@
+"""semslam map, on a saved run of the rendered room."""
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import open3d as o3d
+import pytest
+
+from semslam.config import Config
+from semslam.datasets import open_dataset
+from semslam.runs.pipeline import run
+from semslam.runs.results import write_run
+from tests.conftest import Call
+
+SCENE = "synthetic:room?frames=30&width=160&noise=0"
+
+
+@pytest.fixture(scope="module")
+def saved(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a short run."""
+    dataset = open_dataset(SCENE)
+    directory = tmp_path_factory.mktemp("runs") / "room"
+    write_run(run(dataset, Config(detector="none")), dataset, directory, plots=False, source=SCENE)
+    return directory
+
+
+def test_a_run_leaves_a_map_with_colours_and_normals(saved: Path) -> None:
+    cloud = o3d.io.read_point_cloud(str(saved / "map.ply"))
+    assert len(cloud.points) > 500
+    assert np.allclose(np.linalg.norm(np.asarray(cloud.normals), axis=1), 1.0, atol=1e-4)
+    assert np.asarray(cloud.colors).std() > 0.05
+
+
+def test_the_maps_are_made_again_from_a_saved_run(semslam: Call, saved: Path, tmp_path: Path) -> None:
+    outcome = semslam("map", saved, "--mesh", "--semantic", "--voxel", 0.05, "--out", tmp_path / "maps")
+    assert outcome.code == 0, outcome.err
+    cloud = o3d.io.read_point_cloud(str(tmp_path / "maps" / "map.ply"))
+    mesh = o3d.io.read_triangle_mesh(str(tmp_path / "maps" / "mesh.ply"))
+    sparse = o3d.io.read_point_cloud(str(saved / "map.ply"))
+    assert len(mesh.triangles) > 500
+    assert (tmp_path / "maps" / "semantic.ply").exists()
+    assert (tmp_path / "maps" / "objects.json").exists()
+    # The same surfaces, by other ways: nearly all points of one have one of the other beside them.
+    for other in (sparse, o3d.geometry.PointCloud(mesh.vertices)):
+        assert np.mean(np.asarray(other.compute_point_cloud_distance(cloud)) < 0.1) > 0.9
+
+
+def test_a_map_needs_a_run_and_its_images(semslam: Call, saved: Path, tmp_path: Path) -> None:
+    (tmp_path / "empty").mkdir()
+    assert "no run folder" in semslam("map", tmp_path / "empty").err
+    outcome = semslam("map", saved, "--sequence", "synthetic:room?frames=30&width=128")
+    assert outcome.code == 2
+    assert "not the sequence of the saved run" in outcome.err
+    shutil.copytree(saved, tmp_path / "moved")
+    (tmp_path / "moved" / "sequence.txt").unlink()
+    outcome = semslam("map", tmp_path / "moved")
+    assert outcome.code == 2
+    assert "--sequence" in outcome.err
