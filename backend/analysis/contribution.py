@@ -20,6 +20,10 @@ from semslam.config import BackendConfig
 from semslam.types import FloatArray, LoopConstraint
 
 
+HOLD_SIGMA = 10.0
+"""Radians and metres: keeps a part that only one loop joins to the rest determined when that loop is left out."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Contribution:
     """One accepted loop, left out.
@@ -41,7 +45,9 @@ class Contribution:
 
 
 def leave_one_out(solution: GraphSolution, config: BackendConfig) -> Iterator[Contribution]:
-    """Optimise once more without each accepted loop in turn, in the order of the verdicts.
+    """The graph without each accepted loop in turn, in the order of the verdicts.
+
+    The whole graph is optimised first; from there one Gauss-Newton step of the others leads to where they would be.
 
     Raises:
         GraphError: the optimiser failed.
@@ -51,11 +57,13 @@ def leave_one_out(solution: GraphSolution, config: BackendConfig) -> Iterator[Co
     offset = len(factors) - len(accepted)
     values = optimise(_graph(factors), make_values(solution.poses), config.max_iterations)
     whole, poses_with = 2.0 * _graph(factors).error(values), read_poses(values, solution.poses)
+    linear = [factor.linearize(values) for factor in factors]
     for index, constraint in enumerate(accepted):
-        rest = _graph([*factors[: offset + index], *factors[offset + index + 1 :]])
-        without = optimise(rest, values, config.max_iterations)
+        left_out = offset + index
+        step = _linear_graph([*linear[:left_out], *linear[left_out + 1 :]]).optimize()
+        without = values.retract(step)
         poses = read_poses(without, solution.poses)
-        tension = whole - 2.0 * rest.error(without)
+        tension = whole - 2.0 * _graph([*factors[:left_out], *factors[left_out + 1 :]]).error(without)
         yield Contribution(constraint, tension, _shift(poses, poses_with), poses, poses_with)
 
 
@@ -66,13 +74,19 @@ def _factors(solution: GraphSolution) -> list[gtsam.NonlinearFactor]:
         prior_factor(key, solution.poses[key], ANCHOR_SIGMA if key == firm else FLOATING_SIGMA)
         for key in solution.anchors
     ]
-    # Odometry that hangs together by a loop alone needs a hold of its own once that loop is gone.
-    factors += [prior_factor(key, pose, FLOATING_SIGMA) for key, pose in solution.poses.items()]
+    factors += [prior_factor(key, pose, HOLD_SIGMA) for key, pose in solution.poses.items()]
     return [*map(between_factor, solution.covisible), *factors, *map(between_factor, solution.widened)]
 
 
 def _graph(factors: list[gtsam.NonlinearFactor]) -> gtsam.NonlinearFactorGraph:
     graph = gtsam.NonlinearFactorGraph()
+    for factor in factors:
+        graph.push_back(factor)
+    return graph
+
+
+def _linear_graph(factors: list[gtsam.GaussianFactor]) -> gtsam.GaussianFactorGraph:
+    graph = gtsam.GaussianFactorGraph()
     for factor in factors:
         graph.push_back(factor)
     return graph

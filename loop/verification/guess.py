@@ -58,6 +58,7 @@ class FeaturePair:
         self._gate = threshold**2
         self._threshold = threshold
         self._distances = hamming_distances(ours.descriptors, theirs.descriptors[self._deep])
+        self._alike = np.nonzero(self._distances <= ALIKE)
 
     def matches(self, ratio: float) -> IntArray:
         """Pairs (K, 2) of query keypoints and matched points that look alike, wherever they are."""
@@ -97,15 +98,13 @@ class FeaturePair:
     def _guided(self, T_match_query: FloatArray, radius: float) -> IntArray:
         """Pairs that are each other's most alike among those no farther than ``radius`` in u and v."""
         points = transform_points(invert(T_match_query), self._points)
-        ahead = np.flatnonzero(points[:, 2] > NEAREST)
-        predicted = self._camera.project(points[ahead]).astype(np.float32)
-        pixels = self._pixels.astype(np.float32)
-        near = np.abs(pixels[:, None, 0] - predicted[:, 0]) <= radius
-        near &= np.abs(pixels[:, None, 1] - predicted[:, 1]) <= radius
-        rows, columns = np.nonzero(near)
-        distances = self._distances[rows, ahead[columns]]
-        alike = distances <= ALIKE
-        rows, columns, distances = rows[alike], ahead[columns[alike]], distances[alike]
+        ahead = points[:, 2] > NEAREST
+        predicted = np.full((len(points), 2), np.inf, dtype=np.float32)
+        predicted[ahead] = self._camera.project(points[ahead])
+        rows, columns = self._alike
+        near = (np.abs(self._pixels[rows].astype(np.float32) - predicted[columns]) <= radius).all(1)
+        rows, columns = rows[near], columns[near]
+        distances = self._distances[rows, columns]
         mutual = _nearest(rows, distances) & _nearest(columns, distances)
         return np.column_stack([rows[mutual], columns[mutual]])
 
