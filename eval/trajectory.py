@@ -9,7 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from semslam.errors import TrajectoryError
-from semslam.geometry.se3 import FloatArray, invert, quaternions_to_rotations, rotation_angle, rotations_to_quaternions
+from semslam.eval.metrics import Comparison, TrajectoryMetrics, rms
+from semslam.geometry.se3 import FloatArray, invert, quaternions_to_rotations, rotations_to_quaternions
 from semslam.types import Trajectory
 
 MAX_DIFFERENCE = 0.02
@@ -19,29 +20,6 @@ MIN_COVERAGE = 0.5
 TRIPOD = 1e-3
 
 BoolArray = npt.NDArray[np.bool_]
-
-
-@dataclass(frozen=True, slots=True)
-class TrajectoryScore:
-    """How far an estimate is from the ground truth.
-
-    Attributes:
-        ate_rmse_m: root mean square position error after SE(3) alignment, metres.
-        ate_sim3_rmse_m: the same after Sim(3) alignment.
-        ate_max_m: the largest position error after SE(3) alignment.
-        rpe_trans_1s_m: root mean square error of the motion over one second, metres; None for shorter overlaps.
-        rpe_rot_1s_deg: the same of its rotation, degrees.
-        pairs: associated poses that were scored.
-        scale: factor that the Sim(3) alignment puts on the estimate; 1 is right.
-    """
-
-    ate_rmse_m: float
-    ate_sim3_rmse_m: float
-    ate_max_m: float
-    rpe_trans_1s_m: float | None
-    rpe_rot_1s_deg: float | None
-    pairs: int
-    scale: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -72,7 +50,7 @@ class Similarity:
 
 def score_trajectory(
     estimate: Trajectory, truth: Trajectory, max_difference: float = MAX_DIFFERENCE
-) -> TrajectoryScore:
+) -> TrajectoryMetrics:
     """Score an estimate where ground truth covers it.
 
     Args:
@@ -84,17 +62,12 @@ def score_trajectory(
         TrajectoryError: fewer than three poses have ground truth.
     """
     pairs = associate(estimate, truth, max_difference)
-    similarity = fit_alignment(pairs, with_scale=True)
-    rigid = _position_errors(pairs, fit_alignment(pairs))
-    relative = relative_errors(pairs)
-    return TrajectoryScore(
-        ate_rmse_m=_rms(rigid),
-        ate_sim3_rmse_m=_rms(_position_errors(pairs, similarity)),
-        ate_max_m=float(rigid.max()),
-        rpe_trans_1s_m=_rms(np.linalg.norm(relative[:, :3, 3], axis=1)) if len(relative) else None,
-        rpe_rot_1s_deg=_rms(np.degrees(rotation_angle(relative))) if len(relative) else None,
-        pairs=len(pairs),
-        scale=similarity.scale,
+    return TrajectoryMetrics.of(
+        Comparison(
+            position_errors=_position_errors(pairs, fit_alignment(pairs)),
+            similarity_errors=_position_errors(pairs, fit_alignment(pairs, with_scale=True)),
+            relative_errors=relative_errors(pairs),
+        )
     )
 
 
@@ -166,7 +139,7 @@ def position_errors(
 
 def rmse_after_alignment(pairs: Pairs) -> float:
     """Absolute trajectory error: root mean square position error in metres after SE(3) alignment."""
-    return _rms(_position_errors(pairs, fit_alignment(pairs)))
+    return rms(_position_errors(pairs, fit_alignment(pairs)))
 
 
 def relative_errors(pairs: Pairs, interval: float = RPE_INTERVAL) -> FloatArray:
@@ -258,10 +231,6 @@ def _tripods(poses: FloatArray) -> FloatArray:
 def _position_errors(pairs: Pairs, alignment: Similarity) -> FloatArray:
     moved = alignment.apply(pairs.estimated)
     return np.asarray(np.linalg.norm(moved[:, :3, 3] - pairs.true[:, :3, 3], axis=1))
-
-
-def _rms(values: FloatArray) -> float:
-    return float(np.sqrt(np.mean(np.square(values))))
 
 
 def _span(trajectory: Trajectory) -> str:

@@ -30,6 +30,8 @@ def shown(text: str) -> str:
     return "\n".join(map(printable, text.split("\n")))
 
 
+SHOWN_IN = {"m": "cm", "deg": "degrees"}
+"""Units in tables, by those of the metrics."""
 PIPED_WIDTH = 120
 # A file or a pipe has no width of its own; 80 columns would fold the wider tables.
 out = PlainConsole(width=None if sys.stdout.isatty() else PIPED_WIDTH, markup=False, emoji=False)
@@ -73,28 +75,35 @@ def frame_progress(
 
 
 def metrics_table(runs: Sequence["Metrics"], title: str) -> Table:
-    """A column per run, a row per figure."""
+    """A column for each run, a row for each metric."""
+    from semslam.eval.metrics import ERRORS
+
     table = Table(title=title, title_justify="left", caption_justify="left")
     table.add_column("detector")
     for run in runs:
         table.add_column(run.detector, justify="right")
-    rows: tuple[tuple[str, Callable[[Metrics], str]], ...] = (
-        ("odometry", lambda run: run.odometry),
-        ("ATE of the odometry alone, cm", lambda run: _centimetres(run.odometry_only.ate_rmse_m)),
-        ("ATE, cm", lambda run: _centimetres(run.optimized.ate_rmse_m)),
-        ("ATE after Sim(3), cm", lambda run: _centimetres(run.optimized.ate_sim3_rmse_m)),
-        ("largest error, cm", lambda run: _centimetres(run.optimized.ate_max_m)),
-        ("RPE over 1 s, cm", lambda run: _centimetres(run.optimized.rpe_trans_1s_m)),
-        ("RPE over 1 s, degrees", lambda run: _figure(run.optimized.rpe_rot_1s_deg)),
-        ("tracked", lambda run: _percent(run.tracked / max(run.frames, 1))),
-        ("with ground truth", lambda run: _percent(run.ground_truth_coverage)),
-        ("maps", lambda run: str(run.maps)),
-        ("loops proposed / verified / accepted", lambda run: _counts(run.loops, "proposed", "verified", "accepted")),
-        ("accepted true / inaccurate / false", lambda run: _counts(run.loops, "true", "inaccurate", "false")),
-        ("frames per second", lambda run: _figure(run.time.fps)),
-    )
-    for heading, text in rows:
-        table.add_row(heading, *map(text, runs))
+    rows: list[tuple[str, list[str]]] = [
+        ("odometry", [run.odometry for run in runs]),
+        ("ATE of the odometry alone, cm", [_error(run.odometry_only.ate_rmse_m, "m") for run in runs]),
+        *(
+            (
+                f"{error.title}, {SHOWN_IN[error.unit]}",
+                [_error(getattr(run.optimized, name), error.unit) for run in runs],
+            )
+            for name, error in ERRORS.items()
+        ),
+        ("tracked", [_percent(run.tracked / max(run.frames, 1)) for run in runs]),
+        ("with ground truth", [_percent(run.ground_truth_coverage) for run in runs]),
+        ("maps", [str(run.maps) for run in runs]),
+        (
+            "loops proposed / verified / accepted",
+            [_counts(run.loops, "proposed", "verified", "accepted") for run in runs],
+        ),
+        ("accepted true / inaccurate / false", [_counts(run.loops, "true", "inaccurate", "false") for run in runs]),
+        ("frames per second", [f"{run.time.fps:.2f}" for run in runs]),
+    ]
+    for heading, cells in rows:
+        table.add_row(heading, *cells)
     return table
 
 
@@ -102,12 +111,9 @@ def _counts(loops: "LoopMetrics", *names: str) -> str:
     return " / ".join("-" if getattr(loops, name) is None else str(getattr(loops, name)) for name in names)
 
 
-def _figure(value: float | None) -> str:
-    return "-" if value is None else f"{value:.2f}"
-
-
-def _centimetres(metres: float | None) -> str:
-    return "-" if metres is None else f"{100 * metres:.2f}"
+def _error(value: float | None, unit: str) -> str:
+    """An error in the unit it is shown in."""
+    return "-" if value is None else f"{100 * value if unit == 'm' else value:.2f}"
 
 
 def _percent(share: float | None) -> str:

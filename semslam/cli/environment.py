@@ -18,12 +18,13 @@ PACKAGES = (
     "opencv-python-headless",
     "open3d",
     "gtsam",
-    "torch",
     "onnxruntime",
     "scikit-learn",
     "kiss-icp",
     "evo",
 )
+TRAINING = "torch"
+"""Needed to train the network, and by some detectors and segmenters; a run with the defaults does without."""
 MODULES = {"opencv-python-headless": "cv2", "scikit-learn": "sklearn", "kiss-icp": "kiss_icp"}
 
 
@@ -55,6 +56,9 @@ def doctor_command() -> None:
         out.print(f"{package}: {found}", soft_wrap=True)
         if found.startswith("missing"):
             problems.append(package)
+    found = _import_version(TRAINING)
+    needed = " (only needed for training and some detectors)" if found.startswith("missing") else ""
+    out.print(f"{TRAINING}: {found}{needed}", soft_wrap=True)
     try:
         segmenter = plugins.load("semslam.segmenters", Config().segmentation.name).from_config(Config())
         out.print(f"segmentation network: {len(segmenter.names) - 1} classes")

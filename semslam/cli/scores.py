@@ -31,23 +31,25 @@ def eval_command(
 ) -> None:
     """Score a trajectory file against ground truth."""
     from semslam.datasets.tum_format import read_trajectory
-    from semslam.eval.trajectory import coverage, coverage_remark, score_trajectory
-    from semslam.runs.metrics import TrajectoryMetrics
+    from semslam.eval.metrics import METRICS
+    from semslam.eval.trajectory import associate, coverage, coverage_remark, fit_alignment, score_trajectory
 
     (estimated, estimate_notes), (true, truth_notes) = read_trajectory(estimate), read_trajectory(truth)
     remarks([*estimate_notes, *truth_notes])
-    score = score_trajectory(estimated, true, max_difference)
-    few = coverage_remark(score.pairs, len(estimated))
+    metrics = score_trajectory(estimated, true, max_difference)
+    few = coverage_remark(metrics.pairs, len(estimated))
     remarks([] if few is None else [few])
-    metrics = TrajectoryMetrics.from_score(score)
     if as_json:
         typer.echo(json.dumps(metrics.model_dump(mode="json")))
         return
     table = Table(title=f"{estimate.name} against {truth.name}", title_justify="left", show_header=False)
-    for name, value in metrics.model_dump().items():
-        table.add_row(name, "-" if value is None else f"{value:.6f}" if isinstance(value, float) else str(value))
-    table.add_row("scale", f"{score.scale:.6f}")
-    table.add_row("poses with ground truth", f"{100 * coverage(estimated.timestamps, true, max_difference):.1f} %")
+    for name, metric in METRICS.items():
+        value = getattr(metrics, name)
+        shown = "-" if value is None else f"{value:.6f}" if isinstance(value, float) else str(value)
+        table.add_row(f"{metric.title}, {metric.unit}" if metric.unit else metric.title, shown)
+    scale = fit_alignment(associate(estimated, true, max_difference), with_scale=True).scale
+    table.add_row("scale", f"{scale:.6f}")
+    table.add_row("share with ground truth", f"{100 * coverage(estimated.timestamps, true, max_difference):.1f} %")
     out.print(table)
 
 

@@ -2,29 +2,11 @@
 
 from pydantic import BaseModel, ConfigDict
 
-from semslam.eval.trajectory import TrajectoryScore
+from semslam.eval.metrics import TrajectoryMetrics
 
 
 class _Record(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
-
-
-class TrajectoryMetrics(_Record):
-    """Errors of one trajectory; all None without ground truth (see ``semslam.eval.trajectory.TrajectoryScore``)."""
-
-    ate_rmse_m: float | None = None
-    ate_sim3_rmse_m: float | None = None
-    ate_max_m: float | None = None
-    rpe_trans_1s_m: float | None = None
-    rpe_rot_1s_deg: float | None = None
-    pairs: int | None = None
-
-    @classmethod
-    def from_score(cls, score: TrajectoryScore | None) -> "TrajectoryMetrics":
-        """Take the figures of a score, or None for each."""
-        if score is None:
-            return cls()
-        return cls(**{name: getattr(score, name) for name in cls.model_fields})
 
 
 class LoopMetrics(_Record):

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from semslam.datasets.dataset import Dataset
 from semslam.errors import DatasetError
+from semslam.eval.metrics import ERRORS
 from semslam.eval.report.page import ErrorRow, ReportInput, ReportLoop, loops_to_show, make_report
 from semslam.eval.report.plots import LoopMark, RunDrawing, draw_run
 from semslam.eval.style import LoopKind
@@ -12,13 +13,6 @@ from semslam.runs.metrics import Metrics
 from semslam.runs.pipeline import RunResult
 from semslam.types import LedgerEntry, LoopOutcome, UInt8Array
 
-ERRORS = {
-    "ate_rmse_m": ("ATE (RMSE)", "m"),
-    "ate_sim3_rmse_m": ("ATE after Sim(3)", "m"),
-    "ate_max_m": ("largest error", "m"),
-    "rpe_trans_1s_m": ("RPE over 1 s, translation", "m"),
-    "rpe_rot_1s_deg": ("RPE over 1 s, rotation", "deg"),
-}
 FIGURES = ("inliers", "fitness", "inlier_rmse_m", "overlap", "weight")
 
 
@@ -99,8 +93,8 @@ def _errors(metrics: Metrics) -> tuple[ErrorRow, ...]:
     if metrics.optimized.ate_rmse_m is None:
         return ()
     return tuple(
-        ErrorRow(name, unit, getattr(metrics.odometry_only, field), getattr(metrics.optimized, field))
-        for field, (name, unit) in ERRORS.items()
+        ErrorRow(error.title, error.unit, getattr(metrics.odometry_only, name), getattr(metrics.optimized, name))
+        for name, error in ERRORS.items()
     )
 
 

@@ -10,10 +10,11 @@ from semslam.config import Config
 from semslam.datasets.dataset import Dataset
 from semslam.errors import TrajectoryError
 from semslam.eval.loops.truth import judge_loops
-from semslam.eval.trajectory import TrajectoryScore, coverage, score_trajectory
+from semslam.eval.metrics import TrajectoryMetrics
+from semslam.eval.trajectory import coverage, score_trajectory
 from semslam.runs.contributions import loop_contributions
 from semslam.runs.ledger import rejected_entry, verified_entry
-from semslam.runs.metrics import LoopMetrics, Metrics, TimeMetrics, TrajectoryMetrics
+from semslam.runs.metrics import LoopMetrics, Metrics, TimeMetrics
 from semslam.system.result import FrameState, SlamResult
 from semslam.types import (
     JudgedLoop,
@@ -64,9 +65,9 @@ def score_run(
         lost_intervals=lost_intervals(slam.frames),
         keyframes=len(slam.keyframes),
         ground_truth_coverage=None if truth is None else coverage(stamps, truth),
-        odometry_only=TrajectoryMetrics.from_score(_score(odometry, truth)),
-        live=TrajectoryMetrics.from_score(_score(live, truth)),
-        optimized=TrajectoryMetrics.from_score(_score(trajectory, truth)),
+        odometry_only=_score(odometry, truth),
+        live=_score(live, truth),
+        optimized=_score(trajectory, truth),
         maps=len(slam.solution.components),
         loops=_loop_metrics(slam, ledger, truth is not None),
         time=time,
@@ -106,13 +107,14 @@ def _trajectories(slam: SlamResult) -> tuple[Trajectory, Trajectory, Trajectory]
     )
 
 
-def _score(estimate: Trajectory, truth: Trajectory | None) -> TrajectoryScore | None:
+def _score(estimate: Trajectory, truth: Trajectory | None) -> TrajectoryMetrics:
+    """The errors, all None where there is no ground truth or it meets fewer than three poses."""
     if truth is None:
-        return None
+        return TrajectoryMetrics()
     try:
         return score_trajectory(estimate, truth)
     except TrajectoryError:
-        return None
+        return TrajectoryMetrics()
 
 
 def _ledger(dataset: Dataset, slam: SlamResult, config: Config) -> tuple[LedgerEntry, ...]:
