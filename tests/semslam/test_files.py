@@ -1,5 +1,6 @@
 """Files from outside are read within limits, and every failure is one sentence."""
 
+import contextlib
 import io
 import os
 import zipfile
@@ -109,10 +110,8 @@ def test_damaged_arrays_raise_nothing_foreign(tmp_path: Path, place: int, value:
     damaged = bytearray(WHOLE)
     damaged[place] = value
     (tmp_path / "a.npz").write_bytes(damaged if end % 2 else damaged[:end])
-    try:
+    with contextlib.suppress(DatasetError):
         read_arrays(tmp_path / "a.npz", "The weights", DatasetError)
-    except DatasetError:
-        pass
 
 
 @given(st.text())

@@ -1,5 +1,6 @@
 """YAML that is read as people mean it, or refused in one sentence."""
 
+import contextlib
 from pathlib import Path
 from typing import Any
 
@@ -71,10 +72,8 @@ def test_what_is_doubtful_is_refused(text: str, reason: str) -> None:
 @given(st.text(alphabet=st.sampled_from(list("ab01.:-[]{}#&*!?|>'\"%@,\n\t \\~<\x00\x1béé")), max_size=60))
 @settings(max_examples=300, deadline=None)
 def test_no_text_raises_anything_else(text: str) -> None:
-    try:
+    with contextlib.suppress(ConfigError):
         load_yaml(text)
-    except ConfigError:
-        pass
 
 
 VALUES = st.recursive(

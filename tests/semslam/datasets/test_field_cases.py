@@ -1,5 +1,6 @@
 """Kinds of input that people bring from the field, each rebuilt here as small as it can be."""
 
+import itertools
 import os
 from pathlib import Path
 
@@ -286,7 +287,7 @@ def test_no_names_raise_anything_foreign(tmp_path_factory: pytest.TempPathFactor
         stamps = open_dataset(folder).timestamps
     except SemslamError:
         return
-    assert all(a < b for a, b in zip(stamps, stamps[1:], strict=False))
+    assert all(a < b for a, b in itertools.pairwise(stamps))
 
 
 # Trajectories of other tools.
