@@ -204,7 +204,9 @@ def test_switchable_edges_are_loops_and_their_switches_are_named(tmp_path):
 def test_every_line_that_is_not_read_is_named_and_counted(tmp_path):
     path = tmp_path / "prior.g2o"
     prior = f"EDGE_SE3_PRIOR 0 0 0 0 0 0 0 0 1 {IDENTITY_INFORMATION}\n"
-    path.write_text(f"# comment\n\n{vertices(range(2))}{edge(0, 1)}{prior * 3}PARAMS_SE3OFFSET 0 0 0 0 0 0 0 1\n\x1b[2J x\n")
+    path.write_text(
+        f"# comment\n\n{vertices(range(2))}{edge(0, 1)}{prior * 3}PARAMS_SE3OFFSET 0 0 0 0 0 0 0 1\n\x1b[2J x\n"
+    )
     (note,) = read_g2o(path).notes
     assert "3 EDGE_SE3_PRIOR, 1 PARAMS_SE3OFFSET, 1 \\x1b[2J" in note
     path.write_text(vertices(range(2)) + edge(0, 1))
@@ -228,7 +230,8 @@ def test_chains_of_odometry_end_with_their_symbol():
 
 
 @pytest.mark.parametrize(
-    ("key", "name"), [(0, "0"), (12, "12"), (gtsam.symbol("x", 12), "x12"), (gtsam.LabeledSymbol(120, 65, 3).key(), "xA3")]
+    ("key", "name"),
+    [(0, "0"), (12, "12"), (gtsam.symbol("x", 12), "x12"), (gtsam.LabeledSymbol(120, 65, 3).key(), "xA3")],
 )
 def test_keys_have_names(key, name):
     assert key_name(key) == name

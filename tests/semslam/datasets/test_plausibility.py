@@ -20,7 +20,9 @@ Change = Callable[[Frame], Frame]
 class Changed(ChosenFrames):
     """A sequence whose frames are changed, or whose camera is another one."""
 
-    def __init__(self, dataset: Dataset, change: Change = lambda frame: frame, camera: Intrinsics | None = None) -> None:
+    def __init__(
+        self, dataset: Dataset, change: Change = lambda frame: frame, camera: Intrinsics | None = None
+    ) -> None:
         super().__init__(dataset, range(len(dataset)))
         self._change, self._camera = change, camera or dataset.intrinsics
 
