@@ -153,9 +153,9 @@ def test_overlay_has_a_legend_of_what_is_there():
 def test_folder_labels_belong_to_the_image_whichever_frames_are_read(tmp_path, wall):
     for number in range(len(wall)):
         cv2.imwrite(str(tmp_path / f"{number:04d}.png"), np.full((8, 8), number, np.uint8))
-    segmenter, shown = FolderSegmenter(tmp_path), []
-    for frame in Selection(wall, start=1, stride=4):
-        shown.append(int(segmenter.segment(frame.color, frame.source_index).labels[0, 0]))
+    segmenter = FolderSegmenter(tmp_path)
+    frames = Selection(wall, start=1, stride=4)
+    shown = [segmenter.segment(frame.color, frame.source_index).labels[0, 0] for frame in frames]
     assert shown == [1, 5, 9]
 
 

@@ -329,7 +329,7 @@ def test_redirects_to_http_are_followed(server: Server, tmp_path: Path) -> None:
 
 def test_a_server_that_sends_drop_by_drop_meets_the_time_limit(server: Server, tmp_path: Path) -> None:
     server.drops = True
-    with pytest.raises(DatasetError, match="takes too long: .* run it again to go on"):
+    with pytest.raises(DatasetError, match=r"takes too long: .* run it again to go on"):
         download("fr1/room", tmp_path, base_url=server.url, time_limit=0.2)
     kept = (tmp_path / f"{FOLDER}.tgz.part").stat().st_size
     assert 0 < kept < len(server.content)
