@@ -29,7 +29,7 @@ class Config(Section):
     gives them to their owner.
     """
 
-    model_config = ConfigDict(frozen=True, extra="allow")
+    model_config = ConfigDict(frozen=True, extra="allow", allow_inf_nan=False)
 
     seed: int = setting(0, "seed of everything that draws random numbers", ge=0, lt=2**31)
     odometry: str = setting("feature_map", "registered odometry")

@@ -10,7 +10,7 @@ from semslam.geometry.se3 import FloatArray
 
 EPOCH = (3e8, 4.2e9)
 """Seconds since 1970 that a recording can have begun at: 1979 to 2103."""
-EPOCH_STEPS = (1e-4, 5.0)
+LONGEST_STEP = 5.0
 """Seconds from one frame or pose to the next, the median, where the stamps count from 1970."""
 LONG_STEP = 2000.0
 """Stamps further apart than this are no seconds: half an hour."""
@@ -87,7 +87,7 @@ def recognise_unit(stamps: FloatArray, name: str = "The file") -> TimeUnit:
     largest, step = float(np.abs(finite).max()), float(np.median(steps)) if len(steps) else None
     for unit in (TimeUnit.MILLISECONDS, TimeUnit.MICROSECONDS, TimeUnit.NANOSECONDS):
         low, high = (limit * unit.per_second for limit in EPOCH)
-        fits = step is None or EPOCH_STEPS[0] <= step / unit.per_second <= EPOCH_STEPS[1]
+        fits = step is None or step <= LONGEST_STEP * unit.per_second
         if low <= largest <= high and fits:
             return unit
     if step is not None and len(steps) > 1:

@@ -55,8 +55,8 @@ def read_trajectory(path: str | Path, unit: str | None = None) -> tuple[Trajecto
     notes: list[str] = []
     table = _read_table(path, notes)
     rows = table.rows
-    norms = np.linalg.norm(rows[:, 4:], axis=1)
-    usable = np.isfinite(rows).all(axis=1) & (norms > 1e-6) & (np.abs(rows[:, 1:]) < MAX_VALUE).all(axis=1)
+    moderate = np.isfinite(rows).all(axis=1) & (np.abs(rows[:, 1:]) < MAX_VALUE).all(axis=1)
+    usable = moderate & (np.abs(rows[:, 4:]).max(axis=1) > 1e-6)
     if dropped := int((~usable).sum()):
         notes.append(f"{path.name}: {dropped} of {len(rows)} rows were dropped: not finite, or without a rotation.")
     rows, stamps = rows[usable], [table.stamps[i] for i in np.flatnonzero(usable)]

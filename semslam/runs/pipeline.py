@@ -138,9 +138,11 @@ class _Session:
         self._unreadable: list[str] = []
         self._checksum = 0
         self._interrupted = False
+        self._looks = False  # at the sequence; a replay leaves the images alone, which were looked at when recorded
 
     def track(self) -> Iterator[tuple[int, FrameState | None]]:
         """Read and track every frame."""
+        self._looks = True
         for index, item in enumerate(prefetch(self._dataset)):
             if isinstance(item, DatasetError):
                 self._unreadable.append(str(item))
@@ -215,7 +217,7 @@ class _Session:
 
     def _doubts(self, slam: SlamResult, metrics: Metrics) -> list[str]:
         """What looks wrong with the sequence, and with a score that stands for few of its frames."""
-        found = check_plausibility(self._dataset, [state.index for state in slam.frames])
+        found = check_plausibility(self._dataset, [state.index for state in slam.frames]) if self._looks else ()
         remark = coverage_remark(metrics.optimized.pairs, metrics.frames)
         return [*(doubt.sentence for doubt in found), *([] if remark is None else [remark])]
 

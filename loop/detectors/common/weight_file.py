@@ -1,7 +1,5 @@
 """Reading the arrays that detectors ship, with a clear word when they do not fit."""
 
-import zipfile
-import zlib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -10,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from semslam.errors import ModelError
+from semslam.files import read_arrays
 
 
 @contextmanager
@@ -23,10 +22,10 @@ def open_weights(path: Path, content: str) -> Iterator[Mapping[str, npt.NDArray[
     Raises:
         ModelError: the file is missing, damaged, or holds something else.
     """
+    if not path.exists():
+        raise ModelError(f"There is no {content} at {path}.")
+    arrays = read_arrays(path, f"The {content}", ModelError)
     try:
-        with np.load(path, allow_pickle=False) as arrays:
-            yield arrays
-    except FileNotFoundError as error:
-        raise ModelError(f"There is no {content} at {path}.") from error
-    except (OSError, ValueError, KeyError, EOFError, AttributeError, zipfile.BadZipFile, zlib.error) as error:
+        yield arrays
+    except (ValueError, KeyError, AttributeError) as error:
         raise ModelError(f"{path} is no {content}, or it is damaged.") from error

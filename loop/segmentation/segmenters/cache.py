@@ -2,14 +2,14 @@
 
 import hashlib
 import os
-import zipfile
 from pathlib import Path
 from typing import Self
 
 import numpy as np
 
 from semslam.config import Config
-from semslam.errors import ConfigError
+from semslam.errors import ConfigError, ModelError
+from semslam.files import read_arrays
 from semslam.loop.segmentation.photos import UInt8Array
 from semslam.loop.segmentation.segmenter import Segmenter
 from semslam.plugins import load
@@ -55,7 +55,7 @@ class CachedSegmenter:
             return self._inner.segment(color, frame_index)
         key = hashlib.sha256(self.fingerprint.encode() + str(color.shape).encode() + color.tobytes()).hexdigest()
         path = self._folder / key[:2] / f"{key}.npz"
-        kept = self._read(path)
+        kept = self._read(path, color.shape[:2])
         if kept is None:
             answer = self._inner.segment(color, frame_index)
             steps = None if answer.confidence is None else np.round(answer.confidence * 255).astype(np.uint8)
@@ -64,13 +64,19 @@ class CachedSegmenter:
         labels, steps = kept
         return LabelMap(labels, self.names, None if steps is None else steps.astype(np.float32) / np.float32(255))
 
-    @staticmethod
-    def _read(path: Path) -> tuple[UInt8Array, UInt8Array | None] | None:
-        try:
-            with np.load(path) as arrays:
-                return arrays["labels"], arrays.get("confidence")
-        except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+    def _read(self, path: Path, size: tuple[int, ...]) -> tuple[UInt8Array, UInt8Array | None] | None:
+        """What was kept, or None where it is missing, damaged or something else."""
+        if not path.is_file():
             return None
+        try:
+            arrays = read_arrays(path, "The kept segmentation", ModelError)
+        except ModelError:
+            return None
+        labels, steps = arrays.get("labels"), arrays.get("confidence")
+        kept = [array for array in (labels, steps) if array is not None]
+        if labels is None or any(array.dtype != np.uint8 or array.shape != size for array in kept):
+            return None
+        return (labels, steps) if labels.max(initial=0) < len(self.names) else None
 
 
 def _write(path: Path, labels: UInt8Array, confidence: UInt8Array | None) -> None:

@@ -8,8 +8,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from semslam.backend.analysis.judge import split_edges
+from semslam.backend.graph.chain import OdometryChain
+from semslam.backend.graph.checks import checked_covariance, checked_pose
 from semslam.backend.graph.g2o import read_g2o, write_g2o
+from semslam.backend.graph.keys import chain_of, key_name
 from semslam.backend.graph.products import Edge, PosedGraph
+from semslam.backend.pose_graph import PoseGraph
 from semslam.errors import GraphError
 from semslam.geometry.se3 import exp_so3, make_transform
 
@@ -166,3 +171,121 @@ def test_files_that_cannot_be_opened(tmp_path):
         read_g2o(tmp_path / "binary.g2o")
     with pytest.raises(GraphError, match="cannot be written"):
         write_g2o(tmp_path / "nowhere" / "graph.g2o", random_graph(0))
+
+
+# What other tools write.
+
+
+def vertices(keys):
+    return "".join(f"VERTEX_SE3:QUAT {key} {i} 0 0 0 0 0 1\n" for i, key in enumerate(keys))
+
+
+def edge(from_key, to_key, tag="EDGE_SE3:QUAT", extra=""):
+    return f"{tag} {from_key} {to_key}{extra} 1 0 0 0 0 0 1 {IDENTITY_INFORMATION}\n"
+
+
+def test_switchable_edges_are_loops_and_their_switches_are_named(tmp_path):
+    path = tmp_path / "vertigo.g2o"
+    path.write_text(
+        vertices(range(4))
+        + "".join(edge(i, i + 1) for i in range(3))
+        + "VERTEX_SWITCH 100 1\nEDGE_SWITCH_PRIOR 100 1 1.0\nVERTEX_SWITCH 101 1\n"
+        + edge(0, 3, "EDGE_SE3_SWITCHABLE", " 100")
+        + edge(1, 2, "EDGE_SE3_SWITCHABLE", " 101")
+    )
+    graph = read_g2o(path)
+    odometry, loops = split_edges(graph)
+    assert [(e.from_key, e.to_key) for e in odometry] == [(0, 1), (1, 2), (2, 3)]
+    assert [(e.from_key, e.to_key, e.is_loop) for e in loops] == [(0, 3, True), (1, 2, True)]
+    assert "2 switchable edges are read as loops" in graph.notes[0]
+    assert "2 VERTEX_SWITCH, 1 EDGE_SWITCH_PRIOR" in graph.notes[1]
+
+
+def test_every_line_that_is_not_read_is_named_and_counted(tmp_path):
+    path = tmp_path / "prior.g2o"
+    prior = f"EDGE_SE3_PRIOR 0 0 0 0 0 0 0 0 1 {IDENTITY_INFORMATION}\n"
+    path.write_text(
+        f"# comment\n\n{vertices(range(2))}{edge(0, 1)}{prior * 3}PARAMS_SE3OFFSET 0 0 0 0 0 0 0 1\n\x1b[2J x\n"
+    )
+    (note,) = read_g2o(path).notes
+    assert "3 EDGE_SE3_PRIOR, 1 PARAMS_SE3OFFSET, 1 \\x1b[2J" in note
+    path.write_text(vertices(range(2)) + edge(0, 1))
+    assert read_g2o(path).notes == ()
+
+
+def test_an_edge_is_odometry_only_within_one_symbols_chain(tmp_path):
+    a, b = ([gtsam.symbol(letter, i) for i in range(3)] for letter in "ab")
+    path = tmp_path / "two.g2o"
+    path.write_text(vertices(a + b) + edge(a[0], a[1]) + edge(a[1], a[2]) + edge(b[0], b[1]) + edge(a[2], b[0]))
+    odometry, loops = split_edges(read_g2o(path))
+    assert len(odometry) == 3
+    assert [(key_name(e.from_key), key_name(e.to_key)) for e in loops] == [("a2", "b0")]
+
+
+def test_chains_of_odometry_end_with_their_symbol():
+    a, b = gtsam.symbol("a", 7), gtsam.symbol("b", 0)
+    joined = OdometryChain([a, b], [Edge(a, b, np.eye(4), np.eye(6))]).relative([a], [b])[2]
+    assert not joined[0]
+    assert OdometryChain([5, 6], [Edge(5, 6, np.eye(4), np.eye(6))]).relative([5], [6])[2][0]
+
+
+@pytest.mark.parametrize(
+    ("key", "name"),
+    [(0, "0"), (12, "12"), (gtsam.symbol("x", 12), "x12"), (gtsam.LabeledSymbol(120, 65, 3).key(), "xA3")],
+)
+def test_keys_have_names(key, name):
+    assert key_name(key) == name
+    assert chain_of(key) == (0 if name.isdecimal() else chain_of(key - 1))
+
+
+def test_several_keys_may_be_fixed_in_one_line(tmp_path):
+    path = tmp_path / "graph.g2o"
+    path.write_text(vertices(range(3)) + edge(0, 1) + edge(1, 2) + "FIX 0 2\n")
+    assert read_g2o(path).anchors == (0, 2)
+
+
+@pytest.mark.parametrize("key", ["9" * 5000, str(2**63), "-1", "1.5", "x1"])
+def test_keys_that_cannot_be_are_refused(tmp_path, key):
+    path = tmp_path / "bad.g2o"
+    path.write_text(f"VERTEX_SE3:QUAT {key} 0 0 0 0 0 0 1\n")
+    with pytest.raises(GraphError, match="not a whole number below") as caught:
+        read_g2o(path)
+    assert len(str(caught.value)) < 200
+
+
+WORDS = st.sampled_from(
+    [
+        *"0123456789-.e# \n",
+        *("nan", "1e999", "\x1b", "é", "0 0 0 0 0 0 1", VERTEX, IDENTITY_INFORMATION),
+        *("FIX ", "VERTEX_SE3:QUAT ", "EDGE_SE3:QUAT 0 0 ", "EDGE_SE3_SWITCHABLE "),
+    ]
+)
+
+
+@settings(max_examples=300, deadline=None)
+@given(words=st.lists(WORDS, max_size=30))
+def test_no_graph_raises_anything_foreign(tmp_path_factory, words):
+    path = tmp_path_factory.getbasetemp() / "fuzz.g2o"
+    path.write_text("".join(words))
+    try:
+        read_g2o(path)
+    except GraphError as error:
+        assert str(error).isprintable()
+
+
+def test_poses_of_gtsam_are_poses():
+    T = random_pose(np.random.default_rng(0))
+    assert np.allclose(checked_pose(gtsam.Pose3(T), "The pose"), T)
+    graph = PoseGraph()
+    graph.add_keyframe(0, gtsam.Pose3())
+    graph.add_keyframe(1, gtsam.Pose3(T))
+    graph.add_odometry(0, 1, gtsam.Pose3(T), np.eye(6))
+    assert np.allclose(graph.optimize().poses[1], T)
+
+
+@pytest.mark.parametrize("pose", [None, "pose", [[1, 2], [3]], object(), gtsam.Rot3(), {}, 1j, np.full((4, 4), 1e300)])
+def test_what_is_no_pose_is_one_sentence(pose):
+    with pytest.raises(GraphError, match="The pose"):
+        checked_pose(pose, "The pose")
+    with pytest.raises(GraphError, match="The pose"):
+        checked_covariance(pose, "The pose")

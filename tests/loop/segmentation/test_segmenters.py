@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from semslam.config import Config, load_config
+from semslam.datasets.selection import Selection
 from semslam.errors import ConfigError, DatasetError, ModelError
 from semslam.loop.detectors.common.backbone import Backbone
 from semslam.loop.segmentation.build import build_segmenter
@@ -147,3 +148,22 @@ def test_overlay_has_a_legend_of_what_is_there():
     assert picture.shape == (60, 250, 3)
     assert picture.dtype == np.uint8
     assert len(np.unique(picture[:, 86:104].reshape(-1, 3), axis=0)) == 3  # white, wall, floor
+
+
+def test_folder_labels_belong_to_the_image_whichever_frames_are_read(tmp_path, wall):
+    for number in range(len(wall)):
+        cv2.imwrite(str(tmp_path / f"{number:04d}.png"), np.full((8, 8), number, np.uint8))
+    segmenter = FolderSegmenter(tmp_path)
+    frames = Selection(wall, start=1, stride=4)
+    shown = [segmenter.segment(frame.color, frame.source_index).labels[0, 0] for frame in frames]
+    assert shown == [1, 5, 9]
+
+
+def test_folder_labels_of_16_bits_do_not_wrap(tmp_path):
+    cv2.imwrite(str(tmp_path / "0.png"), np.full((8, 8), 300, np.uint16))
+    (tmp_path / "classes.txt").write_text("void\n" + "".join(f"class {i}\n" for i in range(255)))
+    with pytest.raises(DatasetError, match="holds the label 300"):
+        FolderSegmenter(tmp_path).segment(np.zeros((8, 8, 3), np.uint8), 0)
+    (tmp_path / "classes.txt").write_text("void\n" + "".join(f"class {i}\n" for i in range(400)))
+    with pytest.raises(DatasetError, match="401 names; labels go up to 255"):
+        FolderSegmenter(tmp_path)

@@ -75,3 +75,64 @@ def test_stress_needs_a_run(semslam: Call, tmp_path: Path) -> None:
     outcome = semslam("stress", tmp_path)
     assert outcome.code == 2
     assert "no run folder" in outcome.err
+
+
+# What files hold never steers the terminal, and no number crashes a command.
+
+POSES = "".join(f"{i / 10} {i} 0 0 0 0 0 1\n" for i in range(40))
+
+
+def test_control_characters_of_files_never_reach_the_terminal(semslam: Call, tmp_path: Path) -> None:
+    evil = tmp_path / "a\x1b[31m\x9b\u202e[bold]:smile:[red]"
+    evil.mkdir()
+    (evil / "poses.txt").write_text(POSES)
+    (evil / "graph.g2o").write_text("VERTEX_SE3:QUAT 0 0 0 0 0 0 0 1\n\x1b]0;title\x07 1\n")
+    (evil / "config.yaml").write_text('"\\e[31mseed": 1\n')
+    calls = (
+        ("eval", evil / "poses.txt", evil / "poses.txt"),
+        ("eval", evil / "none.txt", evil / "poses.txt"),
+        ("graph", evil / "graph.g2o", "--out", evil / "better.g2o"),
+        ("config", "--config", evil / "config.yaml"),
+        ("run", evil),
+        ("config", "--set", "seed=\x1b[2J"),
+    )
+    for call in calls:
+        outcome = semslam(*call)
+        assert outcome.code in (0, 2)
+        for text in (outcome.out, outcome.err):
+            assert not {"\x1b", "\x07", "\x9b", "\u202e"} & set(text)
+    assert "[bold]:smile:[red]" in semslam(*calls[2]).out.replace("\n", "")
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("config", "--seed", "9" * 400),
+        ("eval", "POSES", "POSES", "--max-difference", "nan"),
+        ("eval", "POSES", "POSES", "--max-difference", "inf"),
+        ("eval", "POSES", "POSES", "--max-difference", "1e999"),
+        ("stress", ".", "--false-loops", "nan"),
+        ("run", "synthetic", "--start", "9" * 40),
+        ("run", "synthetic", "--stride", "9" * 40),
+        ("run", "synthetic", "--max-frames", "9" * 5000),
+        ("run", "synthetic", "--set", "dataset.fps=1e-400"),
+        ("run", "synthetic", "--set", "keyframes.interval=1e40"),
+        ("config", "--set", "a=" + "[" * 20_000),
+        ("config", "--set", ".".join("a" * 2000) + "=1"),
+        ("config", "--set", "seed=" + "{a: " * 500),
+    ],
+)
+def test_no_number_and_no_nesting_crashes_a_command(semslam: Call, tmp_path: Path, arguments: tuple[str, ...]) -> None:
+    (tmp_path / "poses.txt").write_text(POSES)
+    outcome = semslam(*(tmp_path / "poses.txt" if word == "POSES" else word for word in arguments))
+    assert outcome.code == 2
+    assert "Traceback" not in outcome.err
+
+
+def test_a_score_of_few_poses_comes_with_a_warning(semslam: Call, tmp_path: Path) -> None:
+    (tmp_path / "poses.txt").write_text(POSES)
+    (tmp_path / "truth.txt").write_text("".join(POSES.splitlines(keepends=True)[:5]))
+    assert (
+        "The errors are of 5 of 40 poses (12 %)" in semslam("eval", tmp_path / "poses.txt", tmp_path / "truth.txt").err
+    )
+    assert "errors are of" not in semslam("eval", tmp_path / "truth.txt", tmp_path / "poses.txt").err

@@ -6,6 +6,7 @@ import shutil
 import socket
 import tarfile
 import threading
+import time
 from collections.abc import Iterator
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
@@ -48,6 +49,10 @@ class Server(ThreadingHTTPServer):
         self.ranges = True
         self.tell_length = True
         self.error: int | None = None
+        self.redirect: str | None = None
+        self.drops = False
+        self.hold = threading.Event()
+        self.hold.set()
         self.requests: list[tuple[str, str | None]] = []
 
     @property
@@ -64,6 +69,13 @@ class Handler(BaseHTTPRequestHandler):
     def do_GET(self) -> None:
         server, wanted = self.server, self.headers.get("Range")
         server.requests.append((self.path, wanted))
+        server.hold.wait(5)
+        if server.redirect:
+            self.send_response(302)
+            self.send_header("Location", server.redirect)
+            self.end_headers()
+            server.redirect = None
+            return
         if server.error:
             self.send_error(server.error)
             return
@@ -81,6 +93,11 @@ class Handler(BaseHTTPRequestHandler):
         if server.tell_length:
             self.send_header("Content-Length", str(len(body)))
         self.end_headers()
+        if server.drops:
+            for start in range(0, len(body), 100):
+                self.wfile.write(body[start : start + 100])
+                time.sleep(0.01)
+            return
         self.wfile.write(body[: server.break_after])
         self.close_connection = True
 
@@ -274,3 +291,68 @@ def test_an_unknown_name_suggests_the_nearest(tmp_path: Path) -> None:
         download("fr1/rooom", tmp_path)
     with pytest.raises(DatasetError, match="no TUM RGB-D sequence"):
         folder_name("")
+
+
+def test_what_is_no_archive_is_refused_before_it_is_stored(server: Server, tmp_path: Path) -> None:
+    server.content = b"<html>not here any more</html>" * 1000
+    with pytest.raises(DatasetError, match="it is no gzip archive"):
+        download("fr1/room", tmp_path, base_url=server.url)
+    assert names(tmp_path) == []
+    server.content = make_archive()
+    assert_complete(tmp_path, download("fr1/room", tmp_path, base_url=server.url))
+
+
+def test_a_retry_after_a_bad_archive_starts_anew(server: Server, tmp_path: Path) -> None:
+    whole = server.content
+    (tmp_path / f"{FOLDER}.tgz.part").write_bytes(b"rubbish" * 1000)
+    with pytest.raises(DatasetError, match="is damaged"):
+        download("fr1/room", tmp_path, base_url=server.url)
+    assert names(tmp_path) == []
+    server.content = whole
+    assert_complete(tmp_path, download("fr1/room", tmp_path, base_url=server.url))
+    assert server.requests[-1][1] is None
+
+
+@pytest.mark.parametrize("place", ["file:///etc/passwd", "ftp://127.0.0.1/a.tgz", "data:,hello"])
+def test_redirects_stay_on_http(server: Server, tmp_path: Path, place: str) -> None:
+    server.redirect = place
+    with pytest.raises(DatasetError, match=r"not safe to follow|answered 302"):
+        download("fr1/room", tmp_path, base_url=server.url)
+    assert names(tmp_path) == []
+
+
+def test_redirects_to_http_are_followed(server: Server, tmp_path: Path) -> None:
+    server.redirect = f"{server.url}/elsewhere.tgz"
+    assert_complete(tmp_path, download("fr1/room", tmp_path, base_url=server.url))
+    assert server.requests[-1][0] == "/dataset/elsewhere.tgz"
+
+
+def test_a_server_that_sends_drop_by_drop_meets_the_time_limit(server: Server, tmp_path: Path) -> None:
+    server.drops = True
+    with pytest.raises(DatasetError, match=r"takes too long: .* run it again to go on"):
+        download("fr1/room", tmp_path, base_url=server.url, time_limit=0.2)
+    kept = (tmp_path / f"{FOLDER}.tgz.part").stat().st_size
+    assert 0 < kept < len(server.content)
+    server.drops = False
+    assert_complete(tmp_path, download("fr1/room", tmp_path, base_url=server.url))
+
+
+def test_a_server_that_never_answers_is_given_up(
+    server: Server, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("semslam.datasets.download.ANSWER_LIMIT_S", 0.2)
+    server.hold.clear()
+    try:
+        with pytest.raises(DatasetError, match="was lost"):
+            download("fr1/room", tmp_path, base_url=server.url)
+    finally:
+        server.hold.set()
+
+
+def test_an_archive_that_unpacks_beyond_the_disk_is_refused(
+    server: Server, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("semslam.datasets.download.MAX_UNPACKED_BYTES", 1000)
+    with pytest.raises(DatasetError, match="unpacks to more than"):
+        download("fr1/room", tmp_path, base_url=server.url)
+    assert names(tmp_path) == []

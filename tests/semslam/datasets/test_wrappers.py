@@ -154,3 +154,33 @@ def test_unreadable_frames_raise() -> None:
 def test_faults_that_leave_nothing_are_refused() -> None:
     with pytest.raises(DatasetError, match="leave no frame"):
         FaultyDataset(Counting(), FaultConfig(gaps=((0.0, 10.0),)))
+
+
+def test_a_frame_keeps_its_number_in_the_source() -> None:
+    chosen = Selection(Counting(), start=3, max_frames=4, stride=5)
+    assert [frame.source_index for frame in chosen] == [3, 8, 13, 18]
+    twice = Selection(chosen, start=1, stride=2)
+    assert [(frame.index, frame.source_index) for frame in twice] == [(0, 8), (1, 18)]
+    assert Counting().frame(4).source_index == 4
+
+
+def test_faults_keep_the_number_of_the_image_that_is_shown() -> None:
+    gaps = Selection(FaultyDataset(Counting(), FaultConfig(gaps=((0.0, 0.45),))), start=2)
+    assert [frame.source_index for frame in gaps][:3] == [7, 8, 9]
+    assert all(int(frame.color[0, 0, 0]) - 1 == frame.source_index for frame in gaps)
+    frozen = FaultyDataset(Counting(), FaultConfig(frozen=((0.45, 0.75),)))
+    assert [frame.source_index for frame in frozen][3:9] == [3, 4, 4, 4, 4, 8]
+
+
+def test_faults_are_of_the_same_images_whichever_frames_are_read() -> None:
+    config = FaultConfig(unreadable=0.3, black=((0.5, 1.0),))
+    whole = FaultyDataset(Counting(), config)
+    chosen = Selection(FaultyDataset(Counting(), config), start=4, stride=3)
+    for index in range(len(chosen)):
+        try:
+            expected = whole.frame(4 + 3 * index)
+        except DatasetError:
+            with pytest.raises(DatasetError):
+                chosen.frame(index)
+        else:
+            assert np.array_equal(chosen.frame(index).color, expected.color)

@@ -122,3 +122,9 @@ def test_run_folders_never_collide(tmp_path: Path) -> None:
     first = new_run_directory(tmp_path, "wall", "none")
     first.mkdir()
     assert new_run_directory(tmp_path, "wall", "none") != first
+
+
+def test_what_looks_wrong_with_a_sequence_is_noted_first(wall: WallDataset) -> None:
+    odd = replace(wall, intrinsics=replace(wall.intrinsics, cx=-5.0))
+    assert run(wall, ALONE).notes == ()
+    assert "principal point (-5, 119.5) lies outside the image" in run(odd, ALONE).notes[0]

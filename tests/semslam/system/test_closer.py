@@ -227,3 +227,14 @@ def test_the_examples_close_their_loops(room, name, capsys):
     without, with_loops = main()
     assert with_loops < 0.5 * without
     assert "loops" in capsys.readouterr().out
+
+
+def test_poses_of_gtsam_are_taken_and_nonsense_is_one_sentence(room):
+    color, depth = images(room)
+    closer = LoopCloser(room.CAMERA, detector=FirstAgain(), verifier=Believer(), T_body_cam=gtsam.Pose3())
+    assert closer.add(X(0), color, depth, T_world_cam=gtsam.Pose3()) == []
+    for key, stamp, pose in (("x1", 1.0, None), (X(1), "now", None), (X(1), 1.0, "here"), (X(1), 1.0, gtsam.Rot3())):
+        with pytest.raises(GraphError):
+            closer.add(key, color, depth, T_world_cam=pose, timestamp=stamp)
+    with pytest.raises(DatasetError, match="A colour image must be"):
+        closer.add(X(1), [[1, 2], [3, 4]], depth)
