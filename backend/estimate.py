@@ -14,6 +14,10 @@ RELINEARIZE = 0.02
 RELINEARIZE_EVERY = 10
 """Updates between two looks at who has moved."""
 NEVER = 2**30
+SETTLING_BUDGET, SETTLING_STEPS = 3_000, 3
+"""Keyframes times linearisations that a loop may cost, and linearisations at the most."""
+GROSS = 50.0
+"""Times the limit that a loop may raise the error to first order and yet be worth a linearisation where it leads."""
 CHUNK = 500
 """Keyframes of a solution that one step takes in."""
 
@@ -37,7 +41,8 @@ class RunningEstimate:
         self._factors = gtsam.NonlinearFactorGraph()
         self._values = gtsam.Values()
         self._staged: dict[int, Pair] = {}
-        self._updates = 0
+        self._updates = self._placed = 0
+        self._known_error: float | None = None  # new keyframes start on their odometry and add nothing to it
 
     def __contains__(self, key: int) -> bool:
         return bool(self._values.exists(key) or self._isam.valueExists(key))
@@ -45,6 +50,7 @@ class RunningEstimate:
     def place(self, key: int, T_world_cam: FloatArray) -> None:
         """Give a new keyframe a pose (4, 4) to start from."""
         self._values.insert(key, gtsam.Pose3(T_world_cam))
+        self._placed += 1
 
     def hold(self, key: int, T_world_cam: FloatArray, sigma: float) -> None:
         """Hold a keyframe at a pose (4, 4) with a standard deviation in radians and metres."""
@@ -56,35 +62,44 @@ class RunningEstimate:
             self._staged[self._factors.size()] = loop
         self._factors.add(between_factor(edge))
 
-    def update(self) -> bool:
-        """Take in what was placed, held and joined; returns whether it was the turn of linearising anew."""
+    def update(self) -> None:
+        """Take in what was placed, held and joined."""
         self._updates += 1
-        moved = self._updates % RELINEARIZE_EVERY == 0
-        result = self._isam.update(self._factors, self._values, force_relinearize=moved)
-        indices = result.getNewFactorsIndices()
+        anew = self._updates % RELINEARIZE_EVERY == 0
+        indices = self._isam.update(self._factors, self._values, force_relinearize=anew).getNewFactorsIndices()
+        self._known_error = None if anew or self._staged else self._known_error
         self.loops.update({loop: indices[place] for place, loop in self._staged.items()})
         self._factors, self._values, self._staged = gtsam.NonlinearFactorGraph(), gtsam.Values(), {}
-        return moved
 
-    def enter(self, edge: Edge, loop: Pair) -> None:
-        """Let a loop shape the poses at once, to first order."""
+    def admit(self, edge: Edge, loop: Pair, max_residual: float) -> bool:
+        """Let a loop shape the poses at once, unless it raises the squared error by more than a true one would.
+
+        Args:
+            edge: the loop.
+            loop: its match and query.
+            max_residual: Mahalanobis distance up to which a loop may be true.
+        """
+        limit = max_residual**2
+        before = self.error() if self._known_error is None else self._known_error
         factors = gtsam.NonlinearFactorGraph()
         factors.add(between_factor(edge))
         (self.loops[loop],) = self._isam.update(factors, gtsam.Values()).getNewFactorsIndices()
+        after, moved = self.error(), False
+        if limit < 2 * (after - before) <= GROSS * limit:
+            moved = self._settle()
+            after = self.error()
+        if 2 * (after - before) <= limit:
+            self._known_error = None if self._settle() else after
+            return True
+        self._remove(loop)
+        self._known_error = None if moved and self._settle() else before
+        return False
 
     def withdraw(self, loop: Pair) -> None:
-        """Undo the effect of a loop at once, to first order."""
-        self._isam.update(gtsam.NonlinearFactorGraph(), gtsam.Values(), [self.loops.pop(loop)])
-
-    def settle(self, steps: int) -> bool:
-        """Linearise anew where poses have moved, so many times at the most; returns whether any had."""
-        moved = False
-        for _ in range(steps):
-            result = self._isam.update(gtsam.NonlinearFactorGraph(), gtsam.Values(), force_relinearize=True)
-            if result.getVariablesRelinearized() == 0:
-                break
-            moved = True
-        return moved
+        """Undo the effect of a loop at once."""
+        self._remove(loop)
+        self._settle()
+        self._known_error = None
 
     def error(self) -> float:
         """Half the sum of squared residuals; takes time in proportion to the graph."""
@@ -101,6 +116,19 @@ class RunningEstimate:
         """The poses of all keyframes that an update has taken in."""
         values = self._isam.calculateEstimate()
         return read_poses(values, values.keys())
+
+    def _remove(self, loop: Pair) -> None:
+        self._isam.update(gtsam.NonlinearFactorGraph(), gtsam.Values(), [self.loops.pop(loop)])
+
+    def _settle(self) -> bool:
+        """Linearise anew where poses moved, as often as the number of keyframes allows; returns whether any had."""
+        moved = False
+        for _ in range(min(SETTLING_STEPS, SETTLING_BUDGET // max(self._placed, 1))):
+            result = self._isam.update(gtsam.NonlinearFactorGraph(), gtsam.Values(), force_relinearize=True)
+            if result.getVariablesRelinearized() == 0:
+                break
+            moved = True
+        return moved
 
 
 def estimate_of(solution: GraphSolution, order: Sequence[int]) -> Steps[RunningEstimate]:

@@ -19,10 +19,6 @@ FIRST_RETRY, RETRY_SHARE = 5, 0.05
 """Waiting loops, and share of all loops, at which all are judged together; then again when they have doubled."""
 BUDGET = 10_000
 """Keyframes times steps of a judgement that one update may cost, and the same times loops that it may try."""
-SETTLING_BUDGET, SETTLING_STEPS = 3_000, 3
-"""Keyframes times linearisations that a loop may cost, and linearisations at the most."""
-GROSS = 50.0
-"""Times the limit that a loop may raise the error to first order and yet be worth a linearisation where it leads."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +73,6 @@ class IncrementalPoseGraph:
         self._odometry_scale = self._loop_scale = 1.0
         self._retry_at, self._due = FIRST_RETRY, False
         self._judgement: Steps[None] | None = None
-        self._known_error: float | None = None  # new keyframes start on their odometry and add nothing to it
 
     @property
     def loops(self) -> tuple[LoopConstraint, ...]:
@@ -149,8 +144,6 @@ class IncrementalPoseGraph:
             self._judgement, self._due = None, True
         if (match, query) in self._estimate.loops:
             self._estimate.withdraw((match, query))
-            self._settle()
-            self._known_error = None
 
     def update(self) -> LoopChange:
         """Take in what was added since the last time.
@@ -161,15 +154,12 @@ class IncrementalPoseGraph:
         Raises:
             GraphError: the graph could not be solved.
         """
-        before = dict.fromkeys(self._estimate.loops)
+        before = tuple(self._estimate.loops)
         try:
             self._take_in()
         except RuntimeError as error:  # GTSAM's own, such as an indeterminate system
             raise GraphError(f"The pose graph could not be updated: {' '.join(str(error).split())}") from error
-        gone = tuple(pair for pair in before if pair not in self._estimate.loops)
-        self._withdrawn.update(dict.fromkeys(gone))
-        self._withdrawn = {pair: None for pair in self._withdrawn if pair in self._waiting}
-        return LoopChange(tuple(pair for pair in self._estimate.loops if pair not in before), gone)
+        return self._changed(before)
 
     def optimize(self) -> GraphSolution:
         """Optimise the whole graph robustly, and go on from there with the loops that were accepted.
@@ -177,11 +167,12 @@ class IncrementalPoseGraph:
         Raises:
             GraphError: the graph is empty or the optimiser failed.
         """
-        solution = self._graph.optimize()
+        solution, before = self._graph.optimize(), tuple(self._estimate.loops)
         self._judgement, self._due = None, False
         self._fresh.clear()
         self._keys_done, self._trusted_done = len(self._keys), len(self._trusted)
         finish(self._start_anew(solution, self._keys_done, self._trusted_done))
+        self._changed(before)
         return solution
 
     def pose(self, key: int) -> FloatArray:
@@ -200,19 +191,26 @@ class IncrementalPoseGraph:
         """All current poses by key; takes time in proportion to their number."""
         return self._estimate.poses()
 
+    def _changed(self, before: Sequence[Pair]) -> LoopChange:
+        now, then = self._estimate.loops, set(before)
+        gone = tuple(pair for pair in before if pair not in now)
+        self._withdrawn = {p: None for p in (*self._withdrawn, *gone) if p in self._waiting}
+        return LoopChange(tuple(pair for pair in now if pair not in then), gone)
+
     def _take_in(self) -> None:
         keys, edges = self._keys[self._keys_done :], self._trusted[self._trusted_done :]
         self._keys_done, self._trusted_done = len(self._keys), len(self._trusted)
         self._extend(self._estimate, keys, edges, self._odometry_scale)
-        if self._estimate.update():
-            self._known_error = None
+        self._estimate.update()
         fresh, self._fresh = self._fresh[: self._affordable], self._fresh[self._affordable :]
         for constraint in fresh:
             if self._map_of[constraint.candidate.match] == self._map_of[constraint.candidate.query]:
-                self._try(constraint)
+                edge = loop_edge(constraint).widened(self._loop_scale)
+                fits = self._estimate.admit(edge, _pair(constraint), self._config.max_residual)
             else:
+                fits, self._due = False, True
+            if not fits:
                 self._waiting[_pair(constraint)] = constraint
-                self._due = True
         if len(self._waiting) + len(self._fresh) >= max(self._retry_at, RETRY_SHARE * len(self._graph.loops)):
             self._due = True
         if self._judgement is None and self._due:
@@ -234,26 +232,6 @@ class IncrementalPoseGraph:
             estimate.hold(key, self._graph.start(key), ANCHOR_SIGMA if key == self._keys[0] else FLOATING_SIGMA)
         for trusted in edges:
             estimate.join(trusted.edge.widened(scale) if trusted.is_odometry else trusted.edge)
-
-    def _try(self, constraint: LoopConstraint) -> None:
-        pair, limit = _pair(constraint), self._config.max_residual**2
-        before = self._estimate.error() if self._known_error is None else self._known_error
-        self._estimate.enter(loop_edge(constraint).widened(self._loop_scale), pair)
-        after = self._estimate.error()
-        settled = False
-        if limit < 2 * (after - before) <= GROSS * limit:
-            settled = self._settle()
-            after = self._estimate.error()
-        if 2 * (after - before) <= limit:
-            self._known_error = None if self._settle() else after
-            return
-        self._estimate.withdraw(pair)
-        self._waiting[pair] = constraint
-        self._known_error = None if settled and self._settle() else before
-
-    def _settle(self) -> bool:
-        """Linearise anew where poses have moved, as far as the number of keyframes allows; returns whether any did."""
-        return self._estimate.settle(min(SETTLING_STEPS, SETTLING_BUDGET // len(self._keys)))
 
     @property
     def _affordable(self) -> int:
@@ -298,7 +276,7 @@ class IncrementalPoseGraph:
             if pair not in judged:
                 estimate.join(loop_edge(loops[pair]).widened(solution.loop_scale), pair)
         estimate.update()
-        self._estimate, self._known_error = estimate, None
+        self._estimate = estimate
         self._odometry_scale, self._loop_scale = solution.odometry_scale, solution.loop_scale
         refused = {pair: verdict.constraint for pair, verdict in judged.items() if not verdict.accepted}
         self._fresh = [constraint for constraint in self._fresh if _pair(constraint) not in judged]
