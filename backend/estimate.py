@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import gtsam
 
-from semslam.backend.graph.factors import ANCHOR_SIGMA, FLOATING_SIGMA, between_factor, prior_factor, read_poses
+from semslam.backend.graph.factors import ANCHOR_SIGMA, between_factor, prior_factor, read_poses
 from semslam.backend.graph.products import Edge, GraphSolution
 from semslam.backend.steps import Steps
 from semslam.types import FloatArray
@@ -13,6 +13,8 @@ RELINEARIZE = 0.02
 """Radians and metres a pose must move before its factors are linearised again."""
 RELINEARIZE_EVERY = 10
 """Updates between two looks at who has moved."""
+LOOSE = 10.0
+"""Radians and metres: holds a map until its loops come; a looser one leaves the system badly conditioned."""
 NEVER = 2**30
 SETTLING_BUDGET, SETTLING_STEPS = 3_000, 3
 """Keyframes times linearisations that a loop may cost, and linearisations at the most."""
@@ -147,14 +149,14 @@ def estimate_of(solution: GraphSolution, order: Sequence[int]) -> Steps[RunningE
     loops = [(edge, (edge.from_key, edge.to_key)) for edge in widened[count:]]
     for edge, loop in (*trusted, *loops):
         steps[max(place[edge.from_key], place[edge.to_key]) // CHUNK].append((edge, loop))
+    anchors = set(solution.anchors)
     # A map whose loops to others come in a later chunk needs a hold of its own until then.
     led = {max(edge.from_key, edge.to_key, key=place.__getitem__) for edge in solution.odometry}
     for number, edges in enumerate(steps):
         for key in order[number * CHUNK : (number + 1) * CHUNK]:
             estimate.place(key, solution.poses[key])
-            if key == solution.anchors[0] or key not in led:
-                sigma = ANCHOR_SIGMA if key == solution.anchors[0] else FLOATING_SIGMA
-                estimate.hold(key, solution.poses[key], sigma)
+            if key in anchors or key not in led:
+                estimate.hold(key, solution.poses[key], ANCHOR_SIGMA if key in anchors else LOOSE)
         for edge, loop in edges:
             estimate.join(edge, loop)
         estimate.update()

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy.typing as npt
 
 from semslam.backend.estimate import Pair, RunningEstimate, estimate_of
-from semslam.backend.graph.factors import ANCHOR_SIGMA, FLOATING_SIGMA
+from semslam.backend.graph.factors import ANCHOR_SIGMA
 from semslam.backend.graph.products import Edge, GraphSolution, loop_edge
 from semslam.backend.pose_graph import PoseGraph
 from semslam.backend.steps import Steps, finish
@@ -17,7 +17,7 @@ from semslam.types import FloatArray, LoopConstraint
 
 FIRST_RETRY, RETRY_SHARE = 5, 0.05
 """Waiting loops, and share of all loops, at which all are judged together; then again when they have doubled."""
-BUDGET = 10_000
+BUDGET = 4_000
 """Keyframes times steps of a judgement that one update may cost, and the same times loops that it may try."""
 
 
@@ -171,7 +171,7 @@ class IncrementalPoseGraph:
         self._judgement, self._due = None, False
         self._fresh.clear()
         self._keys_done, self._trusted_done = len(self._keys), len(self._trusted)
-        finish(self._start_anew(solution, self._keys_done, self._trusted_done))
+        finish(self._start_anew(solution, len(self._keys), len(self._trusted)))
         self._changed(before)
         return solution
 
@@ -229,7 +229,8 @@ class IncrementalPoseGraph:
                 estimate.place(key, estimate.pose(known.from_key) @ known.T_from_to)
                 continue
             estimate.place(key, self._graph.start(key))
-            estimate.hold(key, self._graph.start(key), ANCHOR_SIGMA if key == self._keys[0] else FLOATING_SIGMA)
+            # Maps are held apart until a loop joins them and a new estimate is made.
+            estimate.hold(key, self._graph.start(key), ANCHOR_SIGMA)
         for trusted in edges:
             estimate.join(trusted.edge.widened(scale) if trusted.is_odometry else trusted.edge)
 
@@ -242,12 +243,12 @@ class IncrementalPoseGraph:
         """Do the steps of a judgement that one update may cost."""
         judgement = self._judgement
         for _ in range(self._affordable):
-            if self._judgement is None or judgement is None:
+            if judgement is None:
                 return
             try:
                 next(judgement)
             except StopIteration:
-                self._judgement = None
+                judgement = self._judgement = None
             except GraphError:
                 self._judgement = None
                 raise
@@ -268,8 +269,7 @@ class IncrementalPoseGraph:
             edges: trusted edges that were in it.
         """
         estimate = yield from estimate_of(solution, self._keys[:keys])
-        late_keys, late_edges = self._keys[keys : self._keys_done], self._trusted[edges : self._trusted_done]
-        self._extend(estimate, late_keys, late_edges, solution.odometry_scale)
+        self._extend(estimate, self._keys[keys:], self._trusted[edges:], solution.odometry_scale)
         judged = {_pair(verdict.constraint): verdict for verdict in solution.verdicts}
         loops = {_pair(constraint): constraint for constraint in self._graph.loops}
         for pair in self._estimate.loops:
