@@ -1,35 +1,24 @@
-"""Poses while the run goes on: iSAM2 beside the pose graph (Kaess et al., IJRR 2012)."""
+"""Poses while the run goes on: a running estimate beside the pose graph, and a judgement of loops beside both."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
-import gtsam
 import numpy.typing as npt
 
-from semslam.backend.graph.factors import (
-    ANCHOR_SIGMA,
-    between_factor,
-    make_values,
-    prior_factor,
-    read_poses,
-)
+from semslam.backend.estimate import Pair, RunningEstimate, estimate_of
+from semslam.backend.graph.factors import ANCHOR_SIGMA
 from semslam.backend.graph.products import Edge, GraphSolution, loop_edge
 from semslam.backend.pose_graph import PoseGraph
+from semslam.backend.steps import Steps, finish
 from semslam.config import BackendConfig
 from semslam.errors import GraphError
 from semslam.geometry.se3 import invert
 from semslam.types import FloatArray, LoopConstraint
 
-RELINEARIZE = 0.02
-"""Radians and metres a pose must move before its factors are linearised again."""
-RELINEARIZE_EVERY = 10
-"""Keyframes between two looks at who has moved; loops are followed at once."""
-SETTLING_STEPS = 3
-"""Further iSAM2 steps at the most after a loop came or went."""
 FIRST_RETRY, RETRY_SHARE = 5, 0.05
 """Waiting loops, and share of all loops, at which all are judged together; then again when they have doubled."""
-
-Pair = tuple[int, int]
-"""Match and query of a loop."""
+BUDGET = 4_000
+"""Keyframes times steps of a judgement that one update may cost, and the same times loops that it may try."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,13 +34,23 @@ class LoopChange:
     withdrawn: tuple[Pair, ...]
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Trusted:
+    """An edge of odometry, or one of covisible keyframes, whose deviations are never widened."""
+
+    edge: Edge
+    is_odometry: bool
+
+
 class IncrementalPoseGraph:
     """A pose graph whose poses are up to date after every keyframe.
 
     A loop enters at once if it raises the graph's squared error by no more than a true one would (a likelihood
-    ratio test); otherwise it waits. When enough loops wait, and whenever one joins two maps, the whole graph is
-    optimised robustly and iSAM2 starts anew from there with the loops that were accepted: loops are tried again,
-    and a wrong one that came first does not bar those that come later.
+    ratio test); otherwise it waits. When enough loops wait, and whenever one joins two maps, the whole graph is judged
+    robustly, as ``PoseGraph`` does it, and a new estimate made from the outcome takes the place of the running one:
+    loops are tried again, and a wrong one that came first does not bar those that come later. That work is spread: an
+    update does a number of its steps that depends on the number of keyframes alone, while the running estimate goes on.
+    What comes in meanwhile is added to the new estimate before it takes over.
 
     It is a ``KeyframeGraph``. During a run, for each keyframe: ``add_keyframe`` with odometry's pose, ``add_odometry``,
     ``add_covisible``, ``add_loop``, then ``update``, which returns what became of loops. ``correction`` takes
@@ -63,18 +62,17 @@ class IncrementalPoseGraph:
     def __init__(self, config: BackendConfig | None = None) -> None:
         self._config = config or BackendConfig()
         self._graph = PoseGraph(self._config)
-        self._isam = _new_isam()
-        self._values = gtsam.Values()
-        self._factors = gtsam.NonlinearFactorGraph()
+        self._estimate = RunningEstimate()
+        self._keys: list[int] = []
+        self._trusted: list[_Trusted] = []
         self._fresh: list[LoopConstraint] = []
-        self._slots: dict[Pair, int] = {}
         self._waiting: dict[Pair, LoopConstraint] = {}
-        self._map_of: dict[int, int] = {}
-        self._new: list[int] = []
-        self._odometry_scale = self._loop_scale = 1.0
-        self._retry_at = FIRST_RETRY
-        self._known_error: float | None = None  # new keyframes start on their odometry and add nothing to it
         self._withdrawn: dict[Pair, None] = {}
+        self._map_of: dict[int, int] = {}
+        self._keys_done = self._trusted_done = 0
+        self._odometry_scale = self._loop_scale = 1.0
+        self._retry_at, self._due = FIRST_RETRY, False
+        self._judgement: Steps[None] | None = None
 
     @property
     def loops(self) -> tuple[LoopConstraint, ...]:
@@ -84,11 +82,11 @@ class IncrementalPoseGraph:
     @property
     def accepted(self) -> tuple[Pair, ...]:
         """Match and query of the loops that shape the poses now."""
-        return tuple(self._slots)
+        return tuple(self._estimate.loops)
 
     @property
     def waiting(self) -> tuple[Pair, ...]:
-        """Match and query of the loops that the poses contradict; they will be tried again."""
+        """Match and query of the loops that do not, since the poses contradict them or they join two maps."""
         return tuple(self._waiting)
 
     @property
@@ -96,34 +94,36 @@ class IncrementalPoseGraph:
         """Match and query of the waiting loops that once shaped the poses."""
         return tuple(self._withdrawn)
 
+    @property
+    def judging(self) -> bool:
+        """Whether a judgement of all loops is under way, which further updates go on with."""
+        return self._judgement is not None
+
     def start(self, key: int) -> FloatArray:
         """See ``KeyframeGraph.start``."""
         return self._graph.start(key)
 
     def add_keyframe(self, key: int, T_world_cam: npt.ArrayLike) -> None:
-        """See ``KeyframeGraph.add_keyframe``."""
+        """See ``KeyframeGraph.add_keyframe``; a keyframe starts where odometry takes it from the current poses."""
         self._graph.add_keyframe(key, T_world_cam)
         self._map_of[key] = key
-        self._new.append(key)
+        self._keys.append(key)
 
     def add_prior(self, key: int, T_world_cam: npt.ArrayLike) -> None:
         """See ``KeyframeGraph.add_prior``; only a map's first keyframe can be anchored, before the next ``update``."""
         self._graph.add_prior(key, T_world_cam)
-        self._stage_prior(key, self._graph.start(key))
 
     def add_odometry(self, from_key: int, to_key: int, T_from_to: npt.ArrayLike, covariance: npt.ArrayLike) -> Edge:
-        """See ``KeyframeGraph.add_odometry``; a new keyframe starts where odometry takes it from the current pose."""
+        """See ``KeyframeGraph.add_odometry``."""
         edge = self._graph.add_odometry(from_key, to_key, T_from_to, covariance)
-        self._factors.add(between_factor(edge.widened(self._odometry_scale)))
-        if self._knows(from_key) and not self._knows(to_key):
-            self._values.insert(to_key, self._current(from_key).compose(gtsam.Pose3(edge.T_from_to)))
-        self._join(from_key, to_key)
+        self._trusted.append(_Trusted(edge, is_odometry=True))
+        self._join(edge)
         return edge
 
     def add_covisible(self, edge: Edge) -> Edge:
         """See ``KeyframeGraph.add_covisible``."""
         edge = self._graph.add_covisible(edge)
-        self._factors.add(between_factor(edge))
+        self._trusted.append(_Trusted(edge, is_odometry=False))
         return edge
 
     def add_loop(self, constraint: LoopConstraint) -> None:
@@ -140,9 +140,10 @@ class IncrementalPoseGraph:
         self._graph.remove_loop(match, query)
         self._fresh = [c for c in self._fresh if _pair(c) != (match, query)]
         self._waiting.pop((match, query), None)
-        slot = self._slots.pop((match, query), None)
-        if slot is not None:
-            self._withdraw(slot)
+        if self._judgement is not None:  # it may have counted on the loop
+            self._judgement, self._due = None, True
+        if (match, query) in self._estimate.loops:
+            self._estimate.withdraw((match, query))
 
     def update(self) -> LoopChange:
         """Take in what was added since the last time.
@@ -153,15 +154,12 @@ class IncrementalPoseGraph:
         Raises:
             GraphError: the graph could not be solved.
         """
-        before = dict.fromkeys(self._slots)
+        before = tuple(self._estimate.loops)
         try:
             self._take_in()
         except RuntimeError as error:  # GTSAM's own, such as an indeterminate system
             raise GraphError(f"The pose graph could not be updated: {' '.join(str(error).split())}") from error
-        gone = tuple(pair for pair in before if pair not in self._slots)
-        self._withdrawn.update(dict.fromkeys(gone))
-        self._withdrawn = {pair: None for pair in self._withdrawn if pair in self._waiting}
-        return LoopChange(tuple(pair for pair in self._slots if pair not in before), gone)
+        return self._changed(before)
 
     def optimize(self) -> GraphSolution:
         """Optimise the whole graph robustly, and go on from there with the loops that were accepted.
@@ -169,16 +167,17 @@ class IncrementalPoseGraph:
         Raises:
             GraphError: the graph is empty or the optimiser failed.
         """
+        solution, before = self._graph.optimize(), tuple(self._estimate.loops)
+        self._judgement, self._due = None, False
         self._fresh.clear()
-        self._new.clear()
-        solution = self._graph.optimize()
-        self._start_anew(solution)
+        self._keys_done, self._trusted_done = len(self._keys), len(self._trusted)
+        finish(self._start_anew(solution, len(self._keys), len(self._trusted)))
+        self._changed(before)
         return solution
 
     def pose(self, key: int) -> FloatArray:
         """The current pose T_world_cam (4, 4) of one keyframe, which an ``update`` has taken in."""
-        T_world_cam: FloatArray = self._isam.calculateEstimatePose3(key).matrix()
-        return T_world_cam
+        return self._estimate.pose(key)
 
     def correction(self, key: int) -> FloatArray:
         """T_world_odom (4, 4): takes the frame in which a keyframe was added to that of its current pose.
@@ -190,96 +189,111 @@ class IncrementalPoseGraph:
 
     def poses(self) -> dict[int, FloatArray]:
         """All current poses by key; takes time in proportion to their number."""
-        values = self._isam.calculateEstimate()
-        return read_poses(values, values.keys())
+        return self._estimate.poses()
+
+    def _changed(self, before: Sequence[Pair]) -> LoopChange:
+        now, then = self._estimate.loops, set(before)
+        gone = tuple(pair for pair in before if pair not in now)
+        self._withdrawn = {p: None for p in (*self._withdrawn, *gone) if p in self._waiting}
+        return LoopChange(tuple(pair for pair in now if pair not in then), gone)
 
     def _take_in(self) -> None:
-        for key in self._new:
-            if not self._knows(key):
-                self._stage_prior(key, self._graph.start(key))
-        self._new.clear()
-        self._isam.update(self._factors, self._values)
-        self._factors, self._values = gtsam.NonlinearFactorGraph(), gtsam.Values()
-        fresh, self._fresh = self._fresh, []
-        apart = [c for c in fresh if self._map_of[c.candidate.match] != self._map_of[c.candidate.query]]
+        keys, edges = self._keys[self._keys_done :], self._trusted[self._trusted_done :]
+        self._keys_done, self._trusted_done = len(self._keys), len(self._trusted)
+        self._extend(self._estimate, keys, edges, self._odometry_scale)
+        self._estimate.update()
+        fresh, self._fresh = self._fresh[: self._affordable], self._fresh[self._affordable :]
         for constraint in fresh:
-            if constraint not in apart:
-                self._try(constraint)
-        if apart or len(self._waiting) >= max(self._retry_at, RETRY_SHARE * len(self._graph.loops)):
-            self.optimize()
-            self._retry_at = max(FIRST_RETRY, 2 * len(self._waiting))
+            if self._map_of[constraint.candidate.match] == self._map_of[constraint.candidate.query]:
+                edge = loop_edge(constraint).widened(self._loop_scale)
+                fits = self._estimate.admit(edge, _pair(constraint), self._config.max_residual)
+            else:
+                fits, self._due = False, True
+            if not fits:
+                self._waiting[_pair(constraint)] = constraint
+        if len(self._waiting) + len(self._fresh) >= max(self._retry_at, RETRY_SHARE * len(self._graph.loops)):
+            self._due = True
+        if self._judgement is None and self._due:
+            self._judgement, self._due = self._judge(), False
+        self._go_on()
 
-    def _try(self, constraint: LoopConstraint) -> None:
-        if self._known_error is None:
-            self._known_error = self._error()
-        factors = gtsam.NonlinearFactorGraph()
-        factors.add(between_factor(loop_edge(constraint).widened(self._loop_scale)))
-        (slot,) = self._isam.update(factors, gtsam.Values(), force_relinearize=True).getNewFactorsIndices()
-        self._settle()
-        error = self._error()
-        if 2 * (error - self._known_error) <= self._config.max_residual**2:
-            self._slots[_pair(constraint)] = slot
-            self._known_error = error
-        else:
-            self._withdraw(slot)
-            self._waiting[_pair(constraint)] = constraint
+    def _extend(self, estimate: RunningEstimate, keys: Sequence[int], edges: Sequence[_Trusted], scale: float) -> None:
+        """Add keyframes, each where odometry takes it from one that has a pose, or else where it was given."""
+        odometry: dict[int, list[Edge]] = {}
+        for trusted in edges:
+            if trusted.is_odometry:
+                odometry.setdefault(trusted.edge.to_key, []).append(trusted.edge)
+        for key in keys:
+            known = next((edge for edge in odometry.get(key, ()) if edge.from_key in estimate), None)
+            if known is not None:
+                estimate.place(key, estimate.pose(known.from_key) @ known.T_from_to)
+                continue
+            estimate.place(key, self._graph.start(key))
+            # Maps are held apart until a loop joins them and a new estimate is made.
+            estimate.hold(key, self._graph.start(key), ANCHOR_SIGMA)
+        for trusted in edges:
+            estimate.join(trusted.edge.widened(scale) if trusted.is_odometry else trusted.edge)
 
-    def _withdraw(self, slot: int) -> None:
-        self._isam.update(gtsam.NonlinearFactorGraph(), gtsam.Values(), [slot], force_relinearize=True)
-        self._settle()
-        self._known_error = None
+    @property
+    def _affordable(self) -> int:
+        """Steps, or loops to try, that one update may cost."""
+        return max(1, BUDGET // max(len(self._keys), 1))
 
-    def _settle(self) -> None:
-        for _ in range(SETTLING_STEPS):
-            result = self._isam.update(gtsam.NonlinearFactorGraph(), gtsam.Values(), force_relinearize=True)
-            if result.getVariablesRelinearized() == 0:
-                break
+    def _go_on(self) -> None:
+        """Do the steps of a judgement that one update may cost."""
+        judgement = self._judgement
+        for _ in range(self._affordable):
+            if judgement is None:
+                return
+            try:
+                next(judgement)
+            except StopIteration:
+                judgement = self._judgement = None
+            except GraphError:
+                self._judgement = None
+                raise
 
-    def _error(self) -> float:
-        return float(self._isam.getFactorsUnsafe().error(self._isam.calculateEstimate()))
+    def _judge(self) -> Steps[None]:
+        """Judge all loops there are now, and make a new estimate from the outcome."""
+        keys, edges = len(self._keys), len(self._trusted)
+        solution = yield from self._graph.steps()
+        yield from self._start_anew(solution, keys, edges)
+        self._retry_at = max(FIRST_RETRY, 2 * len(self._waiting))
 
-    def _start_anew(self, solution: GraphSolution) -> None:
-        accepted = [verdict for verdict in solution.verdicts if verdict.accepted]
+    def _start_anew(self, solution: GraphSolution, keys: int, edges: int) -> Steps[None]:
+        """Make a new estimate from a solution, chunk by chunk, and let it take the running one's place.
+
+        Args:
+            solution: of the graph as it was some updates ago.
+            keys: keyframes that were in it.
+            edges: trusted edges that were in it.
+        """
+        estimate = yield from estimate_of(solution, self._keys[:keys])
+        self._extend(estimate, self._keys[keys:], self._trusted[edges:], solution.odometry_scale)
+        judged = {_pair(verdict.constraint): verdict for verdict in solution.verdicts}
+        loops = {_pair(constraint): constraint for constraint in self._graph.loops}
+        for pair in self._estimate.loops:
+            if pair not in judged:
+                estimate.join(loop_edge(loops[pair]).widened(solution.loop_scale), pair)
+        estimate.update()
+        self._estimate = estimate
         self._odometry_scale, self._loop_scale = solution.odometry_scale, solution.loop_scale
-        graph = gtsam.NonlinearFactorGraph()
+        refused = {pair: verdict.constraint for pair, verdict in judged.items() if not verdict.accepted}
+        self._fresh = [constraint for constraint in self._fresh if _pair(constraint) not in judged]
+        self._waiting = refused | {pair: loop for pair, loop in self._waiting.items() if pair not in judged}
         for component in solution.components:
-            key = next(anchor for anchor in solution.anchors if anchor in component)
-            graph.add(prior_factor(key, solution.poses[key], ANCHOR_SIGMA))
             self._map_of.update(dict.fromkeys(component, component[0]))
-        for edge in (*solution.covisible, *solution.widened):
-            graph.add(between_factor(edge))
-        self._isam, self._known_error = _new_isam(), None
-        slots = self._isam.update(graph, make_values(solution.poses)).getNewFactorsIndices()
-        pairs = [_pair(verdict.constraint) for verdict in accepted]
-        self._slots = dict(zip(pairs, slots[len(slots) - len(pairs) :], strict=True))
-        self._waiting = {_pair(v.constraint): v.constraint for v in solution.verdicts if not v.accepted}
-        self._factors, self._values = gtsam.NonlinearFactorGraph(), gtsam.Values()
+        self._map_of.update({key: key for key in self._keys[keys:]})
+        for trusted in self._trusted[edges:]:
+            if trusted.is_odometry:
+                self._join(trusted.edge)
 
-    def _stage_prior(self, key: int, T_world_cam: FloatArray) -> None:
-        # Maps are held apart until a loop joins them, which starts the graph anew: a loose prior would only make the
-        # system badly conditioned.
-        self._factors.add(prior_factor(key, T_world_cam, ANCHOR_SIGMA))
-        self._values.insert(key, gtsam.Pose3(T_world_cam))
-
-    def _knows(self, key: int) -> bool:
-        return bool(self._values.exists(key) or self._isam.valueExists(key))
-
-    def _current(self, key: int) -> gtsam.Pose3:
-        return self._values.atPose3(key) if self._values.exists(key) else self._isam.calculateEstimatePose3(key)
-
-    def _join(self, from_key: int, to_key: int) -> None:
-        old, new = self._map_of[to_key], self._map_of[from_key]
-        if old == to_key:
-            self._map_of[to_key] = new
+    def _join(self, edge: Edge) -> None:
+        old, new = self._map_of[edge.to_key], self._map_of[edge.from_key]
+        if old == edge.to_key:
+            self._map_of[edge.to_key] = new
         elif old != new:
             self._map_of = {key: new if place == old else place for key, place in self._map_of.items()}
-
-
-def _new_isam() -> gtsam.ISAM2:
-    params = gtsam.ISAM2Params()
-    params.setRelinearizeThreshold(RELINEARIZE)
-    params.relinearizeSkip = RELINEARIZE_EVERY
-    return gtsam.ISAM2(params)
 
 
 def _pair(constraint: LoopConstraint) -> Pair:

@@ -2,9 +2,10 @@
 
 The cost is chordal: an edge with the rotation R_ij, the translation t_ij, the rotational information Ω and a variance
 σ² along each axis costs ||(R_j - R_i R_ij) W^½||² + ||t_j - t_i - R_i t_ij||² / σ², where W = tr(Ω)/2 I - Ω makes it
-the squared Mahalanobis distance for small errors. It is quadratic in the poses' matrices, so that its Lagrangian dual
-is a semidefinite programme (Rosen et al., "SE-Sync", IJRR 2019). Multipliers are read off at the poses: where the
-matrix that they leave is positive semidefinite, the poses are the global optimum.
+the squared Mahalanobis distance for small errors. (W is positive as long as no axis is known better than the other two
+together.) It is quadratic in the poses' matrices, so that its Lagrangian dual is a semidefinite programme (Rosen et
+al., "SE-Sync", IJRR 2019). Multipliers are read off at the poses: where the matrix that they leave is positive
+semidefinite, the poses are the global optimum.
 """
 
 from collections.abc import Sequence
@@ -54,8 +55,9 @@ class Certificate:
 def certify(solution: GraphSolution) -> Certificate:
     """Certify the poses of a solution for odometry and the accepted loops, as far as they were believed.
 
-    Directions of translation count alike, and correlations with rotation do not count. Where covariances are far from
-    that, the poses are not the optimum of this cost, and the gap says so.
+    Directions of translation count alike, correlations with rotation do not count, and the best known axis of rotation
+    counts no more than the other two together. Where covariances are far from that, the poses are not the optimum of
+    this cost, and the gap says so.
     """
     row = {key: index for index, key in enumerate(solution.poses)}
     edges = solution.widened
@@ -72,9 +74,11 @@ def _quadratic_form(edges: Sequence[Edge], row: dict[int, int]) -> sparse.csc_ma
     i, j = np.array([(row[edge.from_key], row[edge.to_key]) for edge in edges]).T
     T = np.stack([edge.T_from_to for edge in edges])
     covariance = np.stack([edge.covariance for edge in edges])
-    information = np.linalg.inv(covariance[:, :3, :3])
+    variances, axes = np.linalg.eigh(covariance[:, :3, :3])
+    known = 1.0 / variances  # best first
+    known[:, 0] = np.minimum(known[:, 0], known[:, 1] + known[:, 2])
     weights = np.zeros((len(edges), 4, 4))
-    weights[:, :3, :3] = np.trace(information, axis1=1, axis2=2)[:, None, None] / 2 * np.eye(3) - information
+    weights[:, :3, :3] = (axes * (known.sum(1, keepdims=True) / 2 - known)[:, None]) @ axes.swapaxes(1, 2)
     weights[:, 3, 3] = 3.0 / np.trace(covariance[:, 3:, 3:], axis1=1, axis2=2)
     ahead = T @ weights
     blocks = [(i, i, ahead @ T.swapaxes(1, 2)), (i, j, -ahead), (j, i, -ahead.swapaxes(1, 2)), (j, j, weights)]

@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from semslam.backend.graph.keys import chain_of
 from semslam.backend.graph.products import Edge
-from semslam.geometry.se3 import adjoint, invert, orthonormalise, rotation_angle
+from semslam.geometry.se3 import invert, orthonormalise, rotation_angle
 from semslam.types import FloatArray, IntArray
 
 BoolArray = npt.NDArray[np.bool_]
@@ -27,8 +27,9 @@ class OdometryChain:
         steps = {(edge.from_key, edge.to_key): edge for edge in odometry}
         self._keys = np.array(ordered, dtype=np.int64)
         self._T = np.tile(np.eye(4), (len(ordered), 1, 1))
-        self._covariance = np.zeros((len(ordered), 6, 6))
         self._chain = np.zeros(len(ordered), dtype=np.int64)
+        covariances = np.zeros((len(ordered), 6, 6))
+        right = np.arange(len(ordered))  # an edge's covariance belongs to its right end
         for row, (last, key) in enumerate(pairwise(ordered), 1):
             forward, backward = steps.get((last, key)), steps.get((key, last))
             edge = (forward or backward) if chain_of(last) == chain_of(key) else None
@@ -37,9 +38,12 @@ class OdometryChain:
                 continue
             T_last_key = edge.T_from_to if forward else invert(edge.T_from_to)
             self._T[row] = orthonormalise(self._T[row - 1] @ T_last_key)
-            # An edge's covariance belongs to its right end.
-            carry = adjoint(self._T[row] if forward else self._T[row - 1])
-            self._covariance[row] = self._covariance[row - 1] + carry @ edge.covariance @ carry.T
+            covariances[row] = edge.covariance
+            right[row] = row if forward else row - 1
+        carry = adjoints(self._T[right])
+        self._covariance = carry @ covariances @ np.swapaxes(carry, 1, 2)
+        for chain in np.split(self._covariance, np.flatnonzero(np.diff(self._chain)) + 1):
+            np.cumsum(chain, axis=0, out=chain)
 
     def relative(self, a: npt.ArrayLike, b: npt.ArrayLike) -> tuple[FloatArray, FloatArray, BoolArray]:
         """Relative poses of pairs of keyframes.

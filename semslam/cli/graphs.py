@@ -88,7 +88,7 @@ def graph_command(
 
 def _certified(certificate: "Certificate") -> str:
     if certificate.gap is None:
-        return "not certified; it may be a local minimum"
+        return "not certified; a lower minimum is not ruled out"
     share = f"{100 * certificate.gap:.2g} %"
     if certificate.certified:
         return f"certified; no other poses cost less by more than {share}"

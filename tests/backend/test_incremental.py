@@ -1,11 +1,13 @@
 """The incremental graph against the batch one, on rings whose truth is exact."""
 
+from itertools import groupby
 from pathlib import Path
 
 import gtsam
 import numpy as np
 import pytest
 
+from semslam.backend import estimate, incremental
 from semslam.backend.analysis.judge import constraint_of, judge_graph, split_edges
 from semslam.backend.analysis.simulation import measure, measure_odometry, ring
 from semslam.backend.analysis.stress import FalseLoopKind, false_loops
@@ -150,6 +152,62 @@ def test_odometry_that_is_too_sure_of_itself_is_widened_on_the_way():
     assert len(graph.accepted) >= 0.8 * len(loops)
 
 
+@pytest.fixture
+def one_step_an_update(monkeypatch):
+    """As in a graph of ten thousand keyframes."""
+    monkeypatch.setattr(incremental, "BUDGET", 1)
+    monkeypatch.setattr(estimate, "SETTLING_BUDGET", 1)
+    monkeypatch.setattr(estimate, "CHUNK", 30)
+
+
+@pytest.mark.parametrize("kind", FalseLoopKind)
+def test_a_judgement_is_spread_over_updates(one_step_an_update, kind):
+    truth, odometry, loops = simulated(seed=3, count=160, loops_every=3)
+    false = false_loops(PosedGraph(dict(enumerate(truth)), (*odometry, *loops)), 9, kind, 0)
+    judging, accepted, poses = [], [], []
+
+    def note(graph, key):
+        judging.append(graph.judging)
+        accepted.append(set(graph.accepted))
+        poses.append(graph.pose(key))
+
+    graph = replay(odometry, [*loops, *false], after_each=note)
+    spans = [len(list(group)) for on, group in groupby(judging) if on]
+    assert max(spans) > 10
+    assert any(judging[i] and accepted[i] - accepted[i - 1] for i in range(1, len(judging)))  # loops enter meanwhile
+    wrong = {(edge.from_key, edge.to_key) for edge in false}
+    assert not wrong & set(graph.accepted)
+    assert set(graph.accepted) | set(graph.waiting) == wrong | {(e.from_key, e.to_key) for e in loops}
+    assert len(graph.accepted) >= 0.9 * len(loops)
+    best = batch(odometry, [loop for loop in loops if (loop.from_key, loop.to_key) in graph.accepted])
+    assert apart(graph.poses(), best.poses) < 0.02
+
+
+def test_a_loop_removed_during_a_judgement_stays_out(one_step_an_update):
+    truth, odometry, loops = simulated(seed=3, count=120, loops_every=3)
+    false = false_loops(PosedGraph(dict(enumerate(truth)), (*odometry, *loops)), 9, FalseLoopKind.RANDOM, 0)
+    removed = []
+
+    def remove(graph, key):
+        if graph.judging and graph.accepted and not removed:
+            removed.append(graph.accepted[0])
+            graph.remove_loop(*removed[0])
+
+    graph = replay(odometry, [*loops, *false], after_each=remove)
+    assert removed
+    assert removed[0] not in {*graph.accepted, *graph.waiting, *graph.withdrawn}
+
+
+def test_a_withdrawn_loop_is_told():
+    _, odometry, loops = simulated(seed=4, count=100, loops_every=2)
+    shift = make_transform(np.eye(3), [0.15, 0.1, 0.0])  # small enough to pass for drift
+    first = replace_pose(loops[0], 0, 50, loops[0].T_from_to @ shift)
+    graph = replay(odometry, [first, *loops[1:]])
+    graph.optimize()
+    assert graph.withdrawn == ((0, 50),)
+    assert (0, 50) in graph.waiting
+
+
 def test_two_maps_are_joined():
     truth, odometry, loops = simulated(40, loops_every=2)
     elsewhere = make_transform(exp_so3([0.4, 1.0, -2.0]), [20.0, 5.0, -3.0])
@@ -192,15 +250,15 @@ def test_gtsams_graphs_cost_the_same_incrementally(name):
     graph = read_g2o(Path(gtsam.findExampleDataFile(name)))
     odometry, loops = split_edges(graph)
     config = BackendConfig(robust="none", max_residual=1e6)
-    incremental = IncrementalPoseGraph(config)
+    running = IncrementalPoseGraph(config)
     for key, T in sorted(graph.poses.items()):
-        incremental.add_keyframe(key, T)
+        running.add_keyframe(key, T)
         for edge in odometry:
             if max(edge.from_key, edge.to_key) == key:
-                incremental.add_odometry(edge.from_key, edge.to_key, edge.T_from_to, edge.covariance)
+                running.add_odometry(edge.from_key, edge.to_key, edge.T_from_to, edge.covariance)
         for loop in loops:
             if max(loop.from_key, loop.to_key) == key:
-                incremental.add_loop(constraint_of(loop))
-        incremental.update()
-    reached = judge_graph(PosedGraph(incremental.poses(), graph.edges), config.model_copy(update={"max_iterations": 1}))
+                running.add_loop(constraint_of(loop))
+        running.update()
+    reached = judge_graph(PosedGraph(running.poses(), graph.edges), config.model_copy(update={"max_iterations": 1}))
     assert reached.cost == pytest.approx(judge_graph(graph, config).cost, rel=1e-3, abs=1e-6)
