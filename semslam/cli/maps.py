@@ -1,12 +1,19 @@
-"""semslam map, view."""
+"""semslam map, diff, view."""
 
+from math import inf
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+from rich.box import SIMPLE_HEAD
+from rich.table import Table
 
 from semslam.cli.command import Command, example
 from semslam.cli.console import bar, out
+from semslam.errors import ConfigError
+
+if TYPE_CHECKING:
+    from semslam.maps.changes import Change
 
 RunFolder = Annotated[Path, typer.Argument(help="A run folder.")]
 Voxel = Annotated[float | None, typer.Option(min=0.005, max=1.0, help="Side of a cell in metres.")]
@@ -37,6 +44,52 @@ def map_command(
         out.print(f"Written: {path}", soft_wrap=True)
 
 
+def diff_command(
+    before: Annotated[Path, typer.Argument(metavar="RUN_A", help="The run folder of the earlier visit.")],
+    after: Annotated[Path | None, typer.Argument(metavar="[RUN_B]", help="The later one's.")] = None,
+    at: Annotated[float | None, typer.Option("--at", help="Compare one run before and after this stamp, s.")] = None,
+    voxel: Voxel = None,
+    out_file: Annotated[Path | None, typer.Option("--out", help="Write the changes as JSON.")] = None,
+) -> None:
+    """Find the things that moved, went or came between two runs, or two parts of one."""
+    from semslam.runs.alignment import align_runs
+    from semslam.runs.differences import find_changes, write_changes
+    from semslam.runs.results import check_place
+    from semslam.runs.saved_views import open_saved
+
+    if (after is None) is (at is None):
+        raise ConfigError("Name a second run, or with --at the stamp that parts the passes of one.")
+    if out_file is not None:
+        check_place(out_file.parent)
+    first = open_saved(before)
+    if after is None:
+        first, second, T_first_second = first.between(-inf, at or 0.0), first.between(at or 0.0, inf), None
+    else:
+        second = open_saved(after)
+        with bar("loops between the runs", None, "keyframes") as update:
+            T_first_second = align_runs(first, second, update)
+    with bar("changes", None, "keyframes") as update:
+        changes = find_changes(first, second, T_first_second, voxel, update)
+    if out_file is not None:
+        write_changes(out_file, changes)
+    out.print(_changes_table(changes))
+
+
+def _changes_table(changes: "tuple[Change, ...]") -> Table:
+    table = Table(box=SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False, caption_justify="left")
+    for heading in ("what happened", "class"):
+        table.add_column(heading)
+    for heading in ("moved by, m", "area, m2", "before, m", "after, m"):
+        table.add_column(heading, justify="right")
+    for change in changes:
+        thing = change.before or change.after
+        places = ["" if t is None else " ".join(f"{c:.2f}" for c in t.centroid) for t in (change.before, change.after)]
+        distance = "" if change.distance_m is None else f"{change.distance_m:.2f}"
+        if thing is not None:
+            table.add_row(change.kind.value, thing.name, distance, f"{thing.area_m2:.2f}", *places)
+    return table
+
+
 def view_command(
     run: RunFolder,
     file: Annotated[Path | None, typer.Option("--save", help="Write a recording (.rrd) and open no window.")] = None,
@@ -48,7 +101,7 @@ def view_command(
     from semslam.viewers.rerun_stream import open_viewer
 
     saved = open_saved(run, sequence)
-    viewer = open_viewer(saved.run.directory.resolve().name, file, live=file is None)
+    viewer = open_viewer(run.resolve().name, file, live=file is None, finished=True)
     with bar(f"{saved.dataset.name} view", len(saved.recording.frames)) as update:
         play(saved, viewer, update)
     viewer.close()
@@ -62,6 +115,12 @@ COMMANDS = (
         map_command,
         "Make the maps of a saved run again: a coloured cloud, a mesh, labels and objects.",
         example("semslam map runs/latest --voxel 0.01", "semslam map RUN --mesh --semantic"),
+    ),
+    Command(
+        "diff",
+        diff_command,
+        "Find the things that moved, went or came between two runs, or two parts of one.",
+        example("semslam diff MORNING EVENING", "semslam diff RUN --at 72.7 --out changes.json"),
     ),
     Command(
         "view",

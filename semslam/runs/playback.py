@@ -1,8 +1,10 @@
 """A saved run shown again, as it went."""
 
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 
+from semslam.datasets.tum_format import read_trajectory
 from semslam.frontend.keyframes import KeyframeBuilder
 from semslam.loop.segmentation.build import build_segmenter
 from semslam.maps.cloud import join_clouds
@@ -14,7 +16,7 @@ from semslam.viewers.viewer import FinishedRun, KeyframeScene, LoopScene, ShownL
 
 
 def play(saved: SavedViews, viewer: Viewer, progress: Progress = silent) -> None:
-    """Show a saved run to a viewer: the odometry's poses frame by frame, images at keyframes, and what came out.
+    """Show a saved run to a viewer: the live poses frame by frame, images at keyframes, and what came out.
 
     The images are read again and labelled by the segmenter of the run's settings.
 
@@ -33,26 +35,38 @@ def play(saved: SavedViews, viewer: Viewer, progress: Progress = silent) -> None
     for entry in saved.run.ledger:
         verified = entry.verdict is not LoopOutcome.REJECTED
         loops[entry.query].append(ShownLoop(entry.query, entry.match, verified))
-    keyframes = []
+    live = _live_poses(saved.run.directory)
+    keyframes: list[Keyframe] = []
     for done, recorded in enumerate(saved.recording.frames, start=1):
-        motion = recorded.motion
-        if not builder.advance(recorded.index, recorded.timestamp, motion):
-            viewer.track(None, _state(recorded, builder.pose.T_odom_cam, None))
-        else:
+        if builder.advance(recorded.index, recorded.timestamp, recorded.motion):
             frame = saved.dataset.frame(recorded.index)
             keyframe = builder.build(frame)
-            viewer.track(frame, _state(recorded, keyframe.T_odom_cam, keyframe.id))
-            viewer.keyframe(KeyframeScene(keyframe, frame, motion.observations))
+            viewer.track(frame, _state(recorded, builder.pose.T_odom_cam, live, keyframe.id))
+            viewer.keyframe(KeyframeScene(keyframe, frame, recorded.motion.observations))
             labels = segmenter.segment(frame.color, frame.source_index)
             viewer.loops(LoopScene(keyframe, labels, loops[keyframe.id]))
             keyframes.append(keyframe)
+        else:
+            viewer.track(None, _state(recorded, builder.pose.T_odom_cam, live, None))
         progress(done, len(saved.recording.frames))
     viewer.finish(lambda: _finished(saved, keyframes))
 
 
-def _state(recorded: RecordedFrame, T_odom_cam: FloatArray, keyframe: int | None) -> FrameState:
-    """A frame as odometry had it; the loops of a saved run are shown with its final trajectory."""
-    return FrameState(recorded.index, recorded.timestamp, recorded.motion, T_odom_cam, T_odom_cam, keyframe)
+def _state(
+    recorded: RecordedFrame, T_odom_cam: FloatArray, live: Mapping[float, FloatArray], keyframe: int | None
+) -> FrameState:
+    """A frame as it was when it was done."""
+    T_world_cam = live.get(recorded.timestamp, T_odom_cam)
+    return FrameState(recorded.index, recorded.timestamp, recorded.motion, T_odom_cam, T_world_cam, keyframe)
+
+
+def _live_poses(directory: Path) -> dict[float, FloatArray]:
+    """The poses (4, 4) as they stood when each frame was done, by stamp; none of a run that did not keep them."""
+    file = directory / "live.txt"
+    if not file.exists():
+        return {}
+    live, _ = read_trajectory(file)
+    return dict(zip(live.timestamps.tolist(), live.poses, strict=True))
 
 
 def _finished(saved: SavedViews, keyframes: Sequence[Keyframe]) -> FinishedRun:

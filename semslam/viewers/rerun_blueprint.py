@@ -7,12 +7,12 @@ if TYPE_CHECKING:
 
 LIVE, FINAL, CAMERA, TRACKING = "world/live", "world/final", "world/live/camera", "tracking"
 IMAGE = f"{CAMERA}/image"
-ADDED_UP = ("path", "landmarks", "cloud", "nodes", "loops/verified", "loops/rejected")
+ADDED_UP = ("path", "odometry", "landmarks", "cloud", "nodes", "loops/verified", "loops/rejected")
 """What grows below ``world/live``: everything up to the moment shown is shown together."""
 
 
-def make_blueprint() -> "Blueprint":
-    """The views and where they stand."""
+def make_blueprint(finished: bool) -> "Blueprint":
+    """The views and where they stand; of a run that is ``finished`` the final map comes first."""
     import rerun.blueprint as rrb
 
     until_now = rrb.VisibleTimeRanges(
@@ -32,7 +32,7 @@ def make_blueprint() -> "Blueprint":
     )
     return rrb.Blueprint(
         rrb.Vertical(
-            rrb.Horizontal(rrb.Tabs(live, final, active_tab=0), images, column_shares=[3, 1]),
+            rrb.Horizontal(rrb.Tabs(live, final, active_tab=int(finished)), images, column_shares=[3, 1]),
             rrb.TimeSeriesView(name="Tracking", origin=TRACKING),
             row_shares=[5, 1],
         ),

@@ -9,13 +9,14 @@ from semslam.viewers.rerun_viewer import RerunViewer
 APPLICATION = "semslam"
 
 
-def open_viewer(name: str, file: Path | None, live: bool) -> RerunViewer:
+def open_viewer(name: str, file: Path | None, live: bool, finished: bool = False) -> RerunViewer:
     """Open a viewer.
 
     Args:
         name: what the recording is called in the viewer.
         file: the .rrd file that is written, or None.
         live: whether to start the viewer and stream into it.
+        finished: whether the run is over, so that its outcome is looked at first.
 
     Raises:
         ConfigError: rerun-sdk is not installed.
@@ -34,7 +35,7 @@ def open_viewer(name: str, file: Path | None, live: bool) -> RerunViewer:
         if file is not None:
             file.parent.mkdir(parents=True, exist_ok=True)
             sinks.append(rr.FileSink(file))
-        stream.set_sinks(*sinks, default_blueprint=make_blueprint())
+        stream.set_sinks(*sinks, default_blueprint=make_blueprint(finished))
     except (OSError, RuntimeError) as error:
         raise ResultsError(f"The viewer cannot be opened: {' '.join(str(error).split())}.") from error
     stream.send_recording_name(name)

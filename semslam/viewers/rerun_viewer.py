@@ -31,6 +31,8 @@ JPEG_QUALITY = 75
 MILLIMETRES = 1000.0
 FRUSTUM = 0.25
 """Metres from the camera's centre at which its image is drawn."""
+WAITING = 64
+"""Keyframes whose images are kept until their labels come; without a loop detector none come."""
 MIN_NODE_AREA = 0.002
 """Share of the image; smaller blocks are not shown as nodes."""
 
@@ -38,8 +40,8 @@ MIN_NODE_AREA = 0.002
 class RerunViewer:
     """Logs a run into a recording.
 
-    Entities lie below ``world/live`` (what is known while the run goes on, in the odometry's world), ``world/final``
-    (what came out) and ``tracking`` (numbers over time), on the timelines ``frame`` and ``time``.
+    Entities lie below ``world/live`` (what is known while the run goes on), ``world/final`` (what came out) and
+    ``tracking`` (numbers over time), on the timelines ``frame`` and ``time``.
 
     Args:
         stream: the open recording.
@@ -48,7 +50,7 @@ class RerunViewer:
     def __init__(self, stream: "RecordingStream") -> None:
         self._stream = stream
         self._last: FrameState | None = None
-        self._positions: list[FloatArray] = []
+        self._poses: list[FloatArray] = []
         self._landmarks: set[int] = set()
         self._unlabelled: dict[int, Frame] = {}
         self._intrinsics: Intrinsics | None = None
@@ -58,14 +60,17 @@ class RerunViewer:
         """See ``Viewer``."""
         import rerun as rr
 
-        self._stream.set_time("frame", sequence=state.index)
-        self._stream.set_time("time", timestamp=state.timestamp)
-        T = state.T_odom_cam
+        self._set_time(state.index, state.timestamp)
+        T = state.T_world_cam
         self._stream.log(CAMERA, rr.Transform3D(translation=T[:3, 3], mat3x3=T[:3, :3]))
-        if self._last is not None and self._last.map_id == state.map_id:
-            step = np.stack([self._last.T_odom_cam[:3, 3], T[:3, 3]])
-            self._stream.log(f"{LIVE}/path", rr.LineStrips3D([step], colors=_rgb(ODOMETRY)))
-        self._last = state
+        last, self._last = self._last, state
+        if last is not None and last.map_id == state.map_id:
+            for name, color, before, now in (
+                ("odometry", ODOMETRY, last.T_odom_cam, state.T_odom_cam),
+                ("path", OPTIMISED, last.T_world_cam, T),
+            ):
+                step = np.stack([before[:3, 3], now[:3, 3]])
+                self._stream.log(f"{LIVE}/{name}", rr.LineStrips3D([step], colors=_rgb(color)))
         self._stream.log(f"{TRACKING}/inliers", rr.Scalars(state.motion.inliers))
         if frame is not None:
             self._show_camera(frame.intrinsics)
@@ -75,8 +80,8 @@ class RerunViewer:
         """See ``Viewer``."""
         import rerun as rr
 
-        T = scene.keyframe.T_odom_cam
-        self._positions.append(T[:3, 3])
+        T = scene.keyframe.T_odom_cam if self._last is None else self._last.T_world_cam
+        self._poses.append(T)
         depth = np.rint(scene.frame.depth * MILLIMETRES).clip(0, 65535).astype(np.uint16)
         png = cv2.imencode(".png", depth, [cv2.IMWRITE_PNG_COMPRESSION, 1])[1].tobytes()
         self._stream.log(f"{IMAGE}/depth", rr.EncodedDepthImage(blob=png, media_type="image/png", meter=MILLIMETRES))
@@ -88,13 +93,19 @@ class RerunViewer:
         if scene.observations is not None:
             self._show_landmarks(scene.observations, scene.keyframe.intrinsics, T)
         self._unlabelled[scene.keyframe.id] = scene.frame
+        if len(self._unlabelled) > WAITING:
+            del self._unlabelled[min(self._unlabelled)]
 
     def loops(self, scene: LoopScene) -> None:
         """See ``Viewer``."""
-        frame = self._unlabelled.pop(scene.keyframe.id)
-        if scene.labels is not None:
-            self._show_labels(scene.labels, frame, scene.keyframe.T_odom_cam)
+        keyframe = scene.keyframe
+        frame = self._unlabelled.pop(keyframe.id, None)
+        self._set_time(keyframe.frame_index, keyframe.timestamp)
+        if scene.labels is not None and frame is not None:
+            self._show_labels(scene.labels, frame, self._poses[keyframe.id])
         self._show_loops(scene.loops)
+        if self._last is not None:
+            self._set_time(self._last.index, self._last.timestamp)
 
     def finish(self, finished: Callable[[], FinishedRun]) -> None:
         """See ``Viewer``."""
@@ -117,6 +128,11 @@ class RerunViewer:
         self._stream.flush()
         self._stream.disconnect()
 
+    def _set_time(self, index: int, timestamp: float) -> None:
+        """What is logged next belongs to this frame."""
+        self._stream.set_time("frame", sequence=index)
+        self._stream.set_time("time", timestamp=timestamp)
+
     def _final(self, name: str, what: object) -> None:
         self._stream.log(f"{FINAL}/{name}", what, static=True)  # type: ignore[arg-type]
 
@@ -131,7 +147,7 @@ class RerunViewer:
         self._stream.log(IMAGE, pinhole, static=True)
         self._stream.log("world", rr.ViewCoordinates.RIGHT_HAND_Y_DOWN, static=True)
 
-    def _show_landmarks(self, seen: Observations, camera: Intrinsics, T_odom_cam: FloatArray) -> None:
+    def _show_landmarks(self, seen: Observations, camera: Intrinsics, T_world_cam: FloatArray) -> None:
         """Show landmarks where they are seen first."""
         import rerun as rr
 
@@ -139,11 +155,11 @@ class RerunViewer:
         self._landmarks.update(seen.landmarks[new].tolist())
         z = seen.depths[new].astype(np.float64)
         rays = (seen.pixels[new] - (camera.cx, camera.cy)) / (camera.fx, camera.fy)
-        points = transform_points(T_odom_cam, np.column_stack([rays * z[:, None], z]))
+        points = transform_points(T_world_cam, np.column_stack([rays * z[:, None], z]))
         self._stream.log(f"{LIVE}/landmarks", rr.Points3D(points, colors=(255, 196, 0), radii=rr.Radius.ui_points(2)))
         self._stream.log(f"{TRACKING}/landmarks", rr.Scalars(len(seen.landmarks)))
 
-    def _show_labels(self, labels: LabelMap, frame: Frame, T_odom_cam: FloatArray) -> None:
+    def _show_labels(self, labels: LabelMap, frame: Frame, T_world_cam: FloatArray) -> None:
         import rerun as rr
 
         if self._names != labels.names:
@@ -158,7 +174,7 @@ class RerunViewer:
         z = nodes.uvd[near, 2:]
         camera = frame.intrinsics
         rays = (camera.undistort_pixels(nodes.uvd[near, :2]) - (camera.cx, camera.cy)) / (camera.fx, camera.fy)
-        points = transform_points(T_odom_cam, np.column_stack([rays * z, z]))
+        points = transform_points(T_world_cam, np.column_stack([rays * z, z]))
         self._stream.log(
             f"{LIVE}/nodes", rr.Points3D(points, class_ids=nodes.labels[near], radii=0.03, show_labels=False)
         )
@@ -169,7 +185,7 @@ class RerunViewer:
         for name, kind, verified in (("verified", LoopKind.ACCEPTED, True), ("rejected", LoopKind.REJECTED, False)):
             kept = [loop for loop in loops if loop.verified is verified]
             if kept:
-                strips = np.array([(self._positions[loop.match], self._positions[loop.query]) for loop in kept])
+                strips = np.array([[self._poses[key][:3, 3] for key in (loop.match, loop.query)] for loop in kept])
                 self._stream.log(f"{LIVE}/loops/{name}", rr.LineStrips3D(strips, colors=_rgb(LOOKS[kind].color)))
             self._stream.log(f"{TRACKING}/loops_{name}", rr.Scalars(len(kept)))
 

@@ -1,6 +1,6 @@
 """Rendered scenes as a dataset: ``synthetic:house?seed=1&light=dim``."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import ClassVar, Self
@@ -15,6 +15,7 @@ from semslam.datasets.synthetic.path import Walk, walk
 from semslam.datasets.synthetic.renderer import Lighting, Renderer, View
 from semslam.datasets.synthetic.scenes import PLANS
 from semslam.datasets.synthetic.sensor import sense_color, sense_depth
+from semslam.datasets.synthetic.shapes import Part
 from semslam.errors import DatasetError
 from semslam.types import Frame, Intrinsics, Trajectory
 
@@ -164,6 +165,10 @@ class SyntheticDataset:
         renderer = _renderer(self._scene, self._request.seed, bool(second and self._request.moved))
         lighting = LIGHTS[self._request.light] if second else LIGHTS["same"]
         return renderer.render(self._walk.poses[index], self.intrinsics, lighting)
+
+    def surfaces(self, moved: bool) -> Sequence[Part]:
+        """What stands in the scene, before or after things were moved."""
+        return PLANS[self._scene].build(self._request.seed, moved).parts
 
     @cached_property
     def _walk(self) -> Walk:

@@ -10,6 +10,11 @@ COLOR_SIGMA, NORMAL_SIGMA, DISTANCE_SIGMA = 0.1, 0.3, 2.0
 STRENGTH = 2.0
 """What a neighbour that is quite alike and sure adds to the logarithm of its class's odds."""
 ROUNDS = 10
+SHARPNESS = 0.3
+"""Power to which the beliefs are raised in the end: neighbours that agree are counted as if each knew it by itself.
+
+With it the mean probability of the chosen labels is the share that is right, on the rendered house (seed 0).
+"""
 
 
 def smooth(votes: Float32Array, cloud: Cloud, voxel: float) -> Float32Array:
@@ -40,9 +45,10 @@ def smooth(votes: Float32Array, cloud: Cloud, voxel: float) -> Float32Array:
     unary = votes[:, used]
     beliefs = _softmax(unary)
     for _ in range(ROUNDS):
-        beliefs = _softmax(unary + STRENGTH * (graph @ beliefs))
+        logits = unary + STRENGTH * (graph @ beliefs)
+        beliefs = _softmax(logits)
     whole = np.zeros_like(votes)
-    whole[:, used] = beliefs
+    whole[:, used] = _softmax(SHARPNESS * logits)
     return whole
 
 
