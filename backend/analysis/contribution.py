@@ -19,7 +19,6 @@ from semslam.backend.robust.least_squares import optimise
 from semslam.config import BackendConfig
 from semslam.types import FloatArray, LoopConstraint
 
-
 HOLD_SIGMA = 10.0
 """Radians and metres: keeps a part that only one loop joins to the rest determined when that loop is left out."""
 
