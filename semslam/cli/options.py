@@ -35,6 +35,11 @@ def finite(value: float) -> float:
     return value
 
 
+def finite_or_none(value: float | None) -> float | None:
+    """The same for a number that may be left out."""
+    return None if value is None else finite(value)
+
+
 def settings(
     config: "Path | Config | None" = None,
     overrides: list[str] | None = None,
