@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
+from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
@@ -13,6 +14,7 @@ from rich.text import Text
 from semslam.errors import printable
 
 if TYPE_CHECKING:
+    from semslam.eval.report.tables import Table as TextTable
     from semslam.runs.metrics import LoopMetrics, Metrics
     from semslam.system.result import FrameState
 
@@ -68,7 +70,7 @@ def bar(title: str, total: int | None, unit: str = "frames") -> Iterator[Callabl
 
 
 def frame_progress(
-    update: Callable[[int, int | None], None], frames: int
+    update: Callable[[int, int | None], None], frames: int | None
 ) -> Callable[[int, "FrameState | None"], None]:
     """A run's progress callback that moves a bar."""
     return lambda index, state: update(index + 1, frames)
@@ -105,6 +107,47 @@ def metrics_table(runs: Sequence["Metrics"], title: str) -> Table:
     for heading, cells in rows:
         table.add_row(heading, *cells)
     return table
+
+
+def comparison_table(runs: Sequence["Metrics"], title: str) -> Table:
+    """A row per detector, narrow enough for 80 columns; centimetres."""
+    table = _narrow(title)
+    headings = ("detector", "alone", "ATE", "max", "RPE", "deg", "tracked", "loops", "t/i/f")
+    for heading in headings:
+        table.add_column(heading, justify="left" if heading == "detector" else "right", no_wrap=True)
+    for run in runs:
+        final = run.optimized
+        table.add_row(
+            run.detector,
+            _error(run.odometry_only.ate_rmse_m, "m"),
+            _error(final.ate_rmse_m, "m"),
+            _error(final.ate_max_m, "m"),
+            _error(final.rpe_trans_1s_m, "m"),
+            _error(final.rpe_rot_1s_deg, "deg"),
+            _percent(run.tracked / max(run.frames, 1)),
+            _counts(run.loops, "proposed", "verified", "accepted").replace(" ", ""),
+            _counts(run.loops, "true", "inaccurate", "false").replace(" ", ""),
+        )
+    table.caption = (
+        "Errors in cm: ATE of the odometry alone and of the final trajectory, largest error, RPE over 1 s and its "
+        "degrees; loops proposed/verified/accepted; accepted true/inaccurate/false."
+    )
+    return table
+
+
+def text_table(content: "TextTable") -> Table:
+    """A table of texts on the terminal."""
+    table = _narrow(content.title)
+    for heading in content.headings:
+        table.add_column(heading, justify="left" if heading == content.headings[0] else "right")
+    for cells in content.rows:
+        table.add_row(*map(Text, cells))
+    table.caption = "\n".join(content.notes) or None
+    return table
+
+
+def _narrow(title: str) -> Table:
+    return Table(title=title, title_justify="left", caption_justify="left", box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
 
 
 def _counts(loops: "LoopMetrics", *names: str) -> str:

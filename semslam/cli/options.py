@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from semslam.config import Config
 
 MOST = 2**31 - 1
+RUNS = Path("runs")
 SEQUENCE_HELP = "A sequence: a folder (TUM, 7-Scenes, generic), a .bag or synthetic:..."
 Sequence = Annotated[str, typer.Argument(help=SEQUENCE_HELP)]
 Odometry = Annotated[str | None, typer.Option("--odometry", help="Registered odometry.")]
@@ -23,6 +24,7 @@ Seed = Annotated[int | None, typer.Option("--seed", min=0, max=2**31 - 1, help="
 Start = Annotated[int, typer.Option("--start", min=0, max=MOST, help="First frame.")]
 MaxFrames = Annotated[int | None, typer.Option("--max-frames", min=1, max=MOST, help="Frames at the most.")]
 Stride = Annotated[int, typer.Option("--stride", min=1, max=MOST, help="Take every n-th frame.")]
+Plots = Annotated[bool, typer.Option("--plots/--no-plots", help="Draw plots and the report.")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON on standard output.")]
 
 
@@ -31,6 +33,11 @@ def finite(value: float) -> float:
     if not math.isfinite(value):
         raise typer.BadParameter("it must be a finite number.")
     return value
+
+
+def finite_or_none(value: float | None) -> float | None:
+    """The same for a number that may be left out."""
+    return None if value is None else finite(value)
 
 
 def settings(

@@ -1,6 +1,5 @@
-"""semslam run, compare, demo."""
+"""semslam run."""
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -18,16 +17,9 @@ if TYPE_CHECKING:
     from semslam.runs.recording import Recording, SavedFrontEnd
     from semslam.viewers.viewer import Viewer
 
-RUNS = Path("runs")
-DEMO_SEQUENCE = "synthetic:house"
-DEMO_DETECTORS = "none,semantic"
-DEMO_ODOMETRY = "feature"
-"""Frame to frame: it drifts, so it shows what loops bring."""
-
 OutDirectory = Annotated[Path | None, typer.Option("--out", help="The run folder itself (default: runs/...).")]
 Visualize = Annotated[bool, typer.Option("--visualize", help="Start the viewer and show the run as it goes.")]
 RerunFile = Annotated[Path | None, typer.Option("--rerun", help="Write a recording (.rrd) for the viewer.")]
-Plots = Annotated[bool, typer.Option("--plots/--no-plots", help="Draw plots and the report.")]
 
 
 def run_command(
@@ -45,7 +37,7 @@ def run_command(
     max_frames: options.MaxFrames = None,
     stride: options.Stride = 1,
     loader: options.Loader = None,
-    plots: Plots = True,
+    plots: options.Plots = True,
     visualize: Visualize = False,
     rerun_file: RerunFile = None,
 ) -> None:
@@ -64,7 +56,7 @@ def run_command(
     if saved is not None:
         saved.check_settings(chosen)
     dataset = open_dataset(source, config=chosen.dataset)
-    directory = out_directory or new_run_directory(RUNS, dataset.name, chosen.detector)
+    directory = out_directory or new_run_directory(options.RUNS, dataset.name, chosen.detector)
     viewer = _viewer(directory.name, rerun_file, visualize)
     metrics = _run_one(dataset, chosen, directory, plots, source, recording, viewer)
     if viewer is not None:
@@ -77,69 +69,6 @@ def run_command(
         remark(f"The saved run was interrupted; its {metrics.frames} frames of {len(dataset)} were used.")
     elif metrics.interrupted:
         raise KeyboardInterrupt
-
-
-def compare_command(
-    sequence: options.Sequence,
-    detectors: Annotated[str, typer.Option("--detectors", help="Names joined by commas.")] = DEMO_DETECTORS,
-    odometry: options.Odometry = None,
-    out_directory: Annotated[Path | None, typer.Option("--out", help="Folder of the run folders.")] = None,
-    config: options.ConfigFile = None,
-    overrides: options.Settings = None,
-    seed: options.Seed = None,
-    start: options.Start = 0,
-    max_frames: options.MaxFrames = None,
-    stride: options.Stride = 1,
-    loader: options.Loader = None,
-    plots: Plots = True,
-) -> None:
-    """Run a sequence once per detector, all else equal, and print the figures side by side."""
-    from semslam.datasets import open_dataset
-    from semslam.runs.results import link_latest, new_run_directory
-
-    chosen = options.settings(config, overrides, odometry, None, seed, loader, start, max_frames, stride)
-    dataset = open_dataset(sequence, config=chosen.dataset)
-    directory = out_directory or new_run_directory(RUNS, dataset.name, "compare")
-    _compare(dataset, chosen, options.detector_names(detectors), directory, plots, sequence)
-    if out_directory is None:
-        link_latest(directory)
-
-
-def demo_command(
-    out_directory: Annotated[Path, typer.Option("--out", help="Folder of the run folders.")] = RUNS / "demo",
-    seed: options.Seed = None,
-) -> None:
-    """Run the embedded sequence without and with semantic loops, and show what the loops bring."""
-    from semslam.datasets import open_dataset
-
-    chosen = options.settings(odometry=DEMO_ODOMETRY, seed=seed)
-    dataset = open_dataset(DEMO_SEQUENCE, config=chosen.dataset)
-    names = options.detector_names(DEMO_DETECTORS)
-    alone, closed = _compare(dataset, chosen, names, out_directory, plots=True, source=DEMO_SEQUENCE)
-    before, after = alone.optimized.ate_rmse_m, closed.optimized.ate_rmse_m
-    if before is not None and after is not None:
-        out.print(
-            f"Semantic loops lower the ATE from {100 * before:.1f} to {100 * after:.1f} cm: {before / after:.1f}-fold."
-        )
-    out.print(f"Open {out_directory / 'semantic' / 'report.html'} to see every loop.", soft_wrap=True)
-
-
-def _compare(
-    dataset: "Dataset", config: "Config", detectors: Sequence[str], directory: Path, plots: bool, source: str
-) -> list["Metrics"]:
-    from semslam.runs.results import write_json
-
-    runs: list[Metrics] = []
-    for name in detectors:
-        runs.append(_run_one(dataset, config.with_changes(detector=name), directory / name, plots, source))
-        write_json(directory / "compare.json", [run.model_dump(mode="json") for run in runs])
-        if runs[-1].interrupted:
-            break
-    out.print(metrics_table(runs, f"{dataset.name}: {runs[0].frames} frames"))
-    out.print(f"Results: {directory}", soft_wrap=True)
-    if runs[-1].interrupted:
-        raise KeyboardInterrupt
-    return runs
 
 
 def _viewer(name: str, file: Path | None, live: bool) -> "Viewer | None":
@@ -203,17 +132,5 @@ COMMANDS = (
             "semslam run DIR --set keyframes.interval=0.5",
             "semslam run --from runs/latest --detector fused",
         ),
-    ),
-    Command(
-        "compare",
-        compare_command,
-        "Run a sequence once per detector, all else equal, and print the figures side by side.",
-        example("semslam compare DIR --detectors none,semantic"),
-    ),
-    Command(
-        "demo",
-        demo_command,
-        "Run the embedded sequence without and with semantic loops.",
-        example("semslam demo"),
     ),
 )

@@ -22,34 +22,38 @@ GROUPS = ("viewpoint", "illumination", "objects")
 
 
 def eval_command(
-    estimate: Annotated[Path, typer.Argument(help="Estimated trajectory, TUM format.")],
-    truth: Annotated[Path, typer.Argument(help="Ground truth, TUM format.")],
+    estimate: Annotated[Path, typer.Argument(help="Estimated trajectory: TUM, KITTI or EuRoC.")],
+    truth: Annotated[Path, typer.Argument(help="Ground truth, likewise.")],
     max_difference: Annotated[
         float, typer.Option(min=0.0, callback=options.finite, help="Seconds that associated stamps may differ.")
     ] = 0.02,
+    rate: Annotated[
+        float | None, typer.Option(min=0.001, help="Poses a second of KITTI files without stamps beside them.")
+    ] = None,
     as_json: options.Json = False,
 ) -> None:
     """Score a trajectory file against ground truth."""
-    from semslam.datasets.tum_format import read_trajectory
+    from semslam.datasets.trajectory_formats import read_poses
     from semslam.eval.metrics import METRICS
     from semslam.eval.trajectory import associate, coverage, coverage_remark, fit_alignment, score_trajectory
 
-    (estimated, estimate_notes), (true, truth_notes) = read_trajectory(estimate), read_trajectory(truth)
+    (estimated, estimate_notes), (true, truth_notes) = read_poses(estimate, rate=rate), read_poses(truth, rate=rate)
     remarks([*estimate_notes, *truth_notes])
     metrics = score_trajectory(estimated, true, max_difference)
     few = coverage_remark(metrics.pairs, len(estimated))
     remarks([] if few is None else [few])
+    share = coverage(estimated.timestamps, true, max_difference)
+    scale = fit_alignment(associate(estimated, true, max_difference), with_scale=True).scale
     if as_json:
-        typer.echo(json.dumps(metrics.model_dump(mode="json")))
+        typer.echo(json.dumps(metrics.model_dump(mode="json") | {"scale": scale, "coverage": share}))
         return
     table = Table(title=f"{estimate.name} against {truth.name}", title_justify="left", show_header=False)
     for name, metric in METRICS.items():
         value = getattr(metrics, name)
         shown = "-" if value is None else f"{value:.6f}" if isinstance(value, float) else str(value)
         table.add_row(f"{metric.title}, {metric.unit}" if metric.unit else metric.title, shown)
-    scale = fit_alignment(associate(estimated, true, max_difference), with_scale=True).scale
     table.add_row("scale", f"{scale:.6f}")
-    table.add_row("share with ground truth", f"{100 * coverage(estimated.timestamps, true, max_difference):.1f} %")
+    table.add_row("share with ground truth", f"{100 * share:.1f} %")
     out.print(table)
 
 

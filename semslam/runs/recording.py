@@ -84,12 +84,22 @@ class SavedFrontEnd:
         Raises:
             ConfigError: a setting of the front end differs.
         """
-        name = self.config.odometry
-        decisive = (*FIXED, *load("semslam.odometry", name).reads, f"plugins.{name}")
-        before, after = self.config.nested(), wanted.nested()
-        changed = next((setting for setting in decisive if _value(before, setting) != _value(after, setting)), None)
+        before, after = front_end_settings(self.config), wanted.nested()
+        changed = next((setting for setting, value in before.items() if value != _value(after, setting)), None)
         if changed is not None:
             raise ConfigError(f"The setting '{changed}' decides the odometry, which a replay takes from the saved run.")
+
+
+def front_end_settings(config: Config) -> dict[str, Any]:
+    """The settings that decide the motions and the choice of keyframes, as plain values by dotted name.
+
+    Raises:
+        ConfigError: the odometry's name is unknown.
+    """
+    name = config.odometry
+    decisive = (*FIXED, *load("semslam.odometry", name).reads, f"plugins.{name}")
+    nested = config.nested()
+    return {setting: _value(nested, setting) for setting in decisive}
 
 
 def _value(settings: Mapping[str, Any], dotted: str) -> Any:
@@ -139,12 +149,21 @@ def read_front_end(directory: Path) -> SavedFrontEnd:
         ResultsError: it is no run folder, was written by an earlier version, or its recording is damaged.
         ConfigError: its settings cannot be read.
     """
-    recording, source = read_recording(directory), directory / SOURCE
+    recording, source = read_recording(directory), read_source(directory)
+    return SavedFrontEnd(load_saved_config(directory / "config.yaml"), recording, source)
+
+
+def read_source(directory: Path) -> str | None:
+    """What the sequence of a run folder was opened by; None where that was not written.
+
+    Raises:
+        ResultsError: the file that holds it cannot be read.
+    """
+    source = directory / SOURCE
     try:
-        named = source.read_text(encoding="utf-8").strip() if source.exists() else None
+        return source.read_text(encoding="utf-8").strip() if source.exists() else None
     except (OSError, UnicodeDecodeError) as error:
         raise ResultsError(f"{source} cannot be read.") from error
-    return SavedFrontEnd(load_saved_config(directory / "config.yaml"), recording, named)
 
 
 def read_recording(directory: Path) -> Recording:

@@ -133,13 +133,7 @@ def read_run(directory: Path) -> SavedRun:
     Raises:
         ResultsError: it is no run folder, or a file in it is damaged.
     """
-    metrics_file = directory / "metrics.json"
-    if not metrics_file.is_file():
-        raise ResultsError(f"{directory} is no run folder: it has no metrics.json.")
-    try:
-        metrics = Metrics.model_validate_json(metrics_file.read_text(encoding="utf-8"))
-    except (ValidationError, UnicodeDecodeError) as error:
-        raise ResultsError(f"{metrics_file} is damaged, or of another version.") from error
+    metrics = read_metrics(directory)
     truth_file = directory / "groundtruth.txt"
     return SavedRun(
         directory=directory,
@@ -152,6 +146,21 @@ def read_run(directory: Path) -> SavedRun:
         keyframe_stamps=_read_keyframe_table(directory / "keyframes.csv"),
         ground_truth=read_trajectory(truth_file)[0] if truth_file.exists() else None,
     )
+
+
+def read_metrics(directory: Path) -> Metrics:
+    """Read what a run measured.
+
+    Raises:
+        ResultsError: it is no run folder, or its metrics are damaged.
+    """
+    metrics_file = directory / "metrics.json"
+    if not metrics_file.is_file():
+        raise ResultsError(f"{directory} is no run folder: it has no metrics.json.")
+    try:
+        return Metrics.model_validate_json(metrics_file.read_text(encoding="utf-8"))
+    except (ValidationError, UnicodeDecodeError) as error:
+        raise ResultsError(f"{metrics_file} is damaged, or of another version.") from error
 
 
 def write_ledger(path: Path, ledger: tuple[LedgerEntry, ...]) -> None:

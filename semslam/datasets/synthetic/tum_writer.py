@@ -18,7 +18,11 @@ DEEPEST = np.iinfo(np.uint16).max
 
 
 def write_tum(
-    dataset: Dataset, folder: Path, jpeg: bool = False, labels: Callable[[int], UInt8Array] | None = None
+    dataset: Dataset,
+    folder: Path,
+    jpeg: bool = False,
+    labels: Callable[[int], UInt8Array] | None = None,
+    report: Callable[[int, int], None] = lambda _done, _whole: None,
 ) -> None:
     """Write a sequence: rgb/, depth/ (16-bit PNG, 5000 a metre), their lists, groundtruth.txt and camera.yaml.
 
@@ -27,6 +31,7 @@ def write_tum(
         folder: a folder that is not there yet, or empty.
         jpeg: colour as JPEG, a few times smaller than PNG, and not exact.
         labels: label image (H, W) uint8 by frame index, for labels/000000.png and so on; none if None.
+        report: called with frames done and in all.
 
     Raises:
         DatasetError: the folder holds something already, cannot be written, or a frame cannot be read.
@@ -47,6 +52,7 @@ def write_tum(
                 _write_image(folder / f"labels/{frame.index:06d}.png", labels(frame.index))
             lists["rgb"].append(f"{stamp} {color}")
             lists["depth"].append(f"{stamp} {depth}")
+            report(frame.index + 1, len(dataset))
         for name, lines in lists.items():
             (folder / f"{name}.txt").write_text("\n".join([*lines, ""]), encoding="utf-8")
     except OSError as error:

@@ -96,7 +96,11 @@ def test_eval_prints_json_for_tools(semslam: Call, tmp_path: Path) -> None:
     outcome = semslam("eval", out / "trajectory.txt", out / "trajectory.txt", "--json")
     scores = json.loads(outcome.out)
     assert scores["ate_rmse_m"] == pytest.approx(0.0, abs=1e-6)
-    assert set(scores) == {"ate_rmse_m", "ate_sim3_rmse_m", "ate_max_m", "rpe_trans_1s_m", "rpe_rot_1s_deg", "pairs"}
+    assert set(scores) == {
+        "ate_rmse_m", "ate_sim3_rmse_m", "ate_max_m", "rpe_trans_1s_m", "rpe_rot_1s_deg", "pairs", "scale", "coverage",
+    }  # fmt: skip
+    assert scores["scale"] == pytest.approx(1.0)
+    assert scores["coverage"] == 1.0
 
 
 def test_config_prints_settings_that_run_accepts(semslam: Call, tmp_path: Path) -> None:

@@ -1,0 +1,55 @@
+"""A picture of methods compared: each one's mean error with its confidence interval, sequence by sequence."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from matplotlib.figure import Figure
+
+from semslam.eval.style import ODOMETRY, OPTIMISED, TRUTH, render
+
+ROW_INCHES, MARGIN_INCHES, WIDTH_INCHES = 0.27, 0.75, 8.5
+
+
+@dataclass(frozen=True, slots=True)
+class Bar:
+    """A method's error on a sequence, centimetres.
+
+    Attributes:
+        label: who.
+        mean: the mean over repeats.
+        low: lower end of the interval, or None.
+        high: its upper end, or None.
+        alone: the mean error of its odometry alone, or None.
+        ours: whether it was measured here; published results look different.
+    """
+
+    label: str
+    mean: float
+    low: float | None = None
+    high: float | None = None
+    alone: float | None = None
+    ours: bool = True
+
+
+def draw_intervals(groups: Sequence[tuple[str, Sequence[Bar]]]) -> bytes:
+    """A PNG with a panel for each sequence (its name, its bars)."""
+    heights = [ROW_INCHES * len(bars) + MARGIN_INCHES for _, bars in groups]
+
+    def draw(figure: Figure) -> None:
+        panels = figure.subplots(len(groups), 1, squeeze=False, height_ratios=heights)[:, 0]
+        for panel, (title, bars) in zip(panels, groups, strict=True):
+            for place, bar in enumerate(bars):
+                if bar.alone is not None:
+                    panel.plot([bar.alone, bar.mean], [place, place], color="#dddddd", linewidth=3, zorder=1)
+                    panel.plot(bar.alone, place, "|", color=ODOMETRY, markersize=11, markeredgewidth=2)
+                if bar.low is not None and bar.high is not None:
+                    panel.plot([bar.low, bar.high], [place, place], color=OPTIMISED, linewidth=2)
+                marker, color = ("o", OPTIMISED) if bar.ours else ("D", TRUTH)
+                panel.plot(bar.mean, place, marker, color=color, markersize=6)
+            panel.set_yticks(range(len(bars)), [bar.label for bar in bars])
+            panel.set_ylim(len(bars) - 0.5, -0.5)
+            panel.set_xlim(left=0)
+            panel.set_title(title)
+        panels[-1].set_xlabel("ATE RMSE, cm (bar: odometry alone; line: 95 % interval of the mean; diamond: not ours)")
+
+    return render(draw, (WIDTH_INCHES, sum(heights)))

@@ -1,0 +1,126 @@
+"""Who makes the runs: this process, processes of this machine, or the workers of a Dask cluster."""
+
+import os
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future
+from contextlib import contextmanager
+from importlib import import_module
+from typing import Any, Protocol
+
+from semslam.errors import ConfigError
+from semslam.studies.sweep.plan import Job
+from semslam.studies.sweep.work import Outcome, make_run
+
+THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+PATIENCE_S = 15
+
+Make = Callable[[Job], Outcome]
+
+
+class Crew(Protocol):
+    """Makes runs, now or later."""
+
+    def submit(self, job: Job) -> "Future[Outcome]":
+        """Have a run made; the future fails only where the process that makes it dies."""
+
+
+class ThisProcess:
+    """Makes each run at once, here.
+
+    Args:
+        make: makes a run.
+    """
+
+    def __init__(self, make: Make = make_run) -> None:
+        self._make = make
+
+    def submit(self, job: Job) -> "Future[Outcome]":
+        """Make a run and return it finished."""
+        future: Future[Outcome] = Future()
+        future.set_result(self._make(job))
+        return future
+
+
+class Processes:
+    """Processes of this machine (joblib's loky); where one dies, new ones take over.
+
+    Args:
+        count: how many.
+    """
+
+    def __init__(self, count: int) -> None:
+        self._count = count
+
+    def submit(self, job: Job) -> "Future[Outcome]":
+        """Have a run made by the next free process."""
+        from joblib.externals.loky import get_reusable_executor
+
+        threads = max((os.cpu_count() or 1) // self._count, 1)
+        executor = get_reusable_executor(
+            max_workers=self._count,
+            timeout=None,
+            initializer=_limit_threads,
+            initargs=(threads,),
+            env=dict.fromkeys(THREAD_VARIABLES, str(threads)),
+        )
+        future: Future[Outcome] = executor.submit(make_run, job)
+        return future
+
+    def stop(self) -> None:
+        """End the processes, at work or not."""
+        from joblib.externals.loky import get_reusable_executor
+
+        get_reusable_executor(max_workers=self._count).shutdown(wait=True, kill_workers=True)
+
+
+@contextmanager
+def local_crew(count: int) -> Iterator[Crew]:
+    """So many processes of this machine."""
+    crew = Processes(count)
+    try:
+        yield crew
+    finally:
+        crew.stop()
+
+
+@contextmanager
+def dask_crew(address: str) -> Iterator[Crew]:
+    """The workers of a Dask scheduler; they must see the data and the suite's folder under the same paths.
+
+    Raises:
+        ConfigError: Dask is not installed, or nothing answers at the address.
+    """
+    try:
+        distributed: Any = import_module("distributed")
+    except ImportError as error:
+        raise ConfigError("--scheduler needs Dask: pip install 'semslam[dask]'.") from error
+    try:
+        client = distributed.Client(address, timeout=PATIENCE_S)
+    except (OSError, ValueError, TimeoutError) as error:
+        raise ConfigError(f"No Dask scheduler answers at {address}.") from error
+    with client:
+        yield _Cluster(client.get_executor(pure=False))
+
+
+class _Cluster:
+    """A Dask cluster by its executor."""
+
+    def __init__(self, executor: "_Executor") -> None:
+        self._executor = executor
+
+    def submit(self, job: Job) -> "Future[Outcome]":
+        """Have a run made by the next free worker."""
+        return self._executor.submit(make_run, job)
+
+
+class _Executor(Protocol):
+    """What is used of Dask's executor."""
+
+    def submit(self, make: Make, job: Job) -> "Future[Outcome]":
+        """Call ``make`` with ``job`` on a worker."""
+
+
+def _limit_threads(count: int) -> None:
+    import cv2
+
+    cv2.setNumThreads(count)
