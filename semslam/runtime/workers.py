@@ -10,7 +10,7 @@ from enum import StrEnum
 from threading import Thread
 from typing import Any, Generic, TypeVar
 
-from semslam.errors import SemslamError
+from semslam.errors import ConfigError, SemslamError
 
 Job = TypeVar("Job")
 Answer = TypeVar("Answer")
@@ -97,6 +97,18 @@ class ProcessWorker(Worker[Job, Answer]):
     def close(self) -> None:
         """See ``Worker``."""
         self._pool.shutdown(wait=True)
+
+
+def worker_kind(name: str) -> WorkerKind:
+    """The kind of that name.
+
+    Raises:
+        ConfigError: there is none.
+    """
+    try:
+        return WorkerKind(name)
+    except ValueError as error:
+        raise ConfigError(f"There is no worker '{name}'. Known: {', '.join(WorkerKind)}.") from error
 
 
 def make_worker(kind: WorkerKind, make: Make[Job, Answer]) -> Worker[Job, Answer]:

@@ -1,7 +1,10 @@
 """Loop closing for somebody else's GTSAM program: an RGB-D keyframe in, between-factors out."""
 
+from collections import deque
 from collections.abc import Callable
+from concurrent.futures import Future
 from dataclasses import dataclass, replace
+from functools import partial
 
 import gtsam
 import numpy as np
@@ -20,7 +23,8 @@ from semslam.geometry.se3 import FloatArray, adjoint, invert
 from semslam.loop.detector import LoopDetector
 from semslam.loop.search import LoopSearch
 from semslam.loop.verification.verifier import LoopVerifier
-from semslam.types import Frame, Intrinsics, LabelMap, LoopConstraint
+from semslam.runtime.workers import WorkerKind, make_worker, worker_kind
+from semslam.types import Frame, Intrinsics, LabelMap, LoopConstraint, Verification
 
 Noise = Callable[[LoopConstraint], gtsam.noiseModel.Base]
 
@@ -45,11 +49,22 @@ class Closure:
     constraint: LoopConstraint
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _SearchJob:
+    """A keyframe's images, pose (4, 4), map, and labels where the caller has them."""
+
+    frame: Frame
+    T_world_cam: FloatArray
+    map_id: int
+    labels: LabelMap | None
+
+
 class LoopCloser:
     """Finds and verifies loop closures and returns them as ``gtsam.BetweenFactorPose3``.
 
-    Everything happens in the caller's thread, within ``add``. Where keyframes come with poses, a loop is followed:
-    after it, earlier keyframes whose views should overlap by those poses are verified as well.
+    Everything happens in the caller's thread, within ``add``, or in a thread or process beside it (``worker``). Where
+    keyframes come with poses, a loop is followed: after it, earlier keyframes whose views should overlap by those poses
+    are verified as well.
 
     The closer never touches the caller's graph: what enters it, and what is taken out again, is the caller's to
     decide. Two rooms that look and measure alike pass every test on two views: only odometry distinguishes them, so
@@ -62,7 +77,9 @@ class LoopCloser:
         T_body_cam: (4, 4) where the graph's poses are not the camera's: the camera in the body's frame.
         noise: makes the factor's noise model of a loop; none = the covariance from the verification.
         kernel: robust kernel to wrap around the noise model, such as ``gtsam.noiseModel.mEstimator.DCS``.
-        verifier: decides on candidates; none = the built-in one.
+        verifier: decides on candidates; none = the registered one.
+        worker: "none", "thread" or "process": where keyframes are described and loops searched. A process needs a
+            detector and a verifier that can be pickled, where they are objects.
 
     Raises:
         ConfigError: a name or setting is unknown.
@@ -80,6 +97,7 @@ class LoopCloser:
         noise: Noise | None = None,
         kernel: gtsam.noiseModel.mEstimator.Base | None = None,
         verifier: LoopVerifier | None = None,
+        worker: WorkerKind | str = WorkerKind.NONE,
     ) -> None:
         self._config = config or Config()
         if isinstance(detector, str):
@@ -89,9 +107,10 @@ class LoopCloser:
         self._noise = noise
         self._kernel = kernel
         own = None if isinstance(detector, str) else detector
-        self._search = LoopSearch.from_config(self._config, detector=own, verifier=verifier)
-        self._builder = KeyframeBuilder(self._config)
+        self._worker = make_worker(worker_kind(worker), partial(_make_search, self._config, own, verifier))
+        self._pending: deque[Future[list[Verification]]] = deque()
         self._keys: list[int] = []
+        self._last_timestamp: float | None = None
         self._closures: list[Closure] = []
 
     @property
@@ -110,7 +129,8 @@ class LoopCloser:
     ) -> list[gtsam.BetweenFactorPose3]:
         """Take a keyframe and return a factor for each earlier one that shows the same place.
 
-        Call it for keyframes (a few a second), not for every frame.
+        Call it for keyframes (a few a second), not for every frame. With a worker it returns at once, with the factors
+        that were found since the last call; ``poll`` returns the others.
 
         Args:
             key: the caller's key of the pose, such as ``gtsam.symbol("x", 7)``.
@@ -123,6 +143,7 @@ class LoopCloser:
         Raises:
             GraphError: the key was used before, the stamp does not ascend, or the pose is not rigid.
             DatasetError: the images do not fit the camera or are of the wrong type.
+            ModelError: a worker's segmentation network cannot be loaded.
         """
         if timestamp is None:
             before = self._last_timestamp
@@ -130,19 +151,30 @@ class LoopCloser:
         self._check(key, timestamp)
         frame = self._frame(color, depth, timestamp)
         if T_world_cam is None:
-            keyframe = self._builder.build_at(frame, np.eye(4), map_id=frame.index)
+            job = _SearchJob(frame, np.eye(4), frame.index, labels)
         else:
-            keyframe = self._builder.build_at(frame, checked_pose(T_world_cam, f"The pose of key {key}"), POSED)
+            job = _SearchJob(frame, checked_pose(T_world_cam, f"The pose of key {key}"), POSED, labels)
         self._keys.append(key)
-        outcomes = self._search.search(keyframe, frame, labels)
-        closures = [self._closure(outcome) for outcome in outcomes if isinstance(outcome, LoopConstraint)]
-        self._closures += closures
-        return [closure.factor for closure in closures]
+        self._last_timestamp = timestamp
+        self._pending.append(self._worker.submit(job))
+        return self.poll()
 
-    @property
-    def _last_timestamp(self) -> float | None:
-        keyframes = self._search.keyframes
-        return keyframes[-1].timestamp if keyframes else None
+    def poll(self, wait: bool = False) -> list[gtsam.BetweenFactorPose3]:
+        """The factors that were found since the last call of this or of ``add``, in the order of the keyframes.
+
+        Args:
+            wait: whether to wait until all keyframes have been searched; without it the call returns at once.
+        """
+        found: list[Closure] = []
+        while self._pending and (wait or self._pending[0].done()):
+            verifications = self._pending.popleft().result()
+            found += [self._closure(one) for one in verifications if isinstance(one, LoopConstraint)]
+        self._closures += found
+        return [closure.factor for closure in found]
+
+    def close(self) -> None:
+        """End the worker; what it has found can still be polled."""
+        self._worker.close()
 
     def believed(self, graph: gtsam.NonlinearFactorGraph) -> list[Closure]:
         """Closures that semslam's own pose graph would follow, given the caller's odometry; the others are doubtful.
@@ -231,4 +263,18 @@ class LoopCloser:
             raise DatasetError(f"A depth image must be {size} in metres, not {depth.shape} {depth.dtype}.")
         usable = np.isfinite(depth) & (depth > 0)
         metres = np.where(usable, depth, 0.0).astype(np.float32)
-        return Frame(len(self._keys), timestamp, color, metres, self._intrinsics)
+        # A copy, since a worker may read it when the caller already writes the next image into the same array.
+        return Frame(len(self._keys), timestamp, color.copy(), metres, self._intrinsics)
+
+
+def _make_search(
+    config: Config, detector: LoopDetector | None, verifier: LoopVerifier | None
+) -> Callable[[_SearchJob], list[Verification]]:
+    search = LoopSearch.from_config(config, detector=detector, verifier=verifier)
+    builder = KeyframeBuilder(config)
+
+    def work(job: _SearchJob) -> list[Verification]:
+        keyframe = builder.build_at(job.frame, job.T_world_cam, job.map_id)
+        return search.search(keyframe, job.frame, job.labels)
+
+    return work

@@ -10,7 +10,7 @@ from gtsam.symbol_shorthand import X
 
 from semslam import LoopCloser
 from semslam.config import Config
-from semslam.errors import DatasetError, GraphError
+from semslam.errors import ConfigError, DatasetError, GraphError
 from semslam.geometry.se3 import exp_so3, invert, make_transform
 from semslam.types import LoopCandidate, LoopConstraint, LoopRejection, RejectionReason
 
@@ -85,6 +85,29 @@ def test_a_verified_loop_is_a_factor_on_the_callers_keys(room):
 
 def test_a_refused_loop_is_no_factor(room):
     assert fill(room, LoopCloser(room.CAMERA, FirstAgain(), verifier=Believer())) == []
+
+
+@pytest.mark.parametrize("worker", ["thread", "process"])
+def test_beside_the_caller_the_same_loops_are_found(room, worker):
+    config = Config().with_changes(loops={"min_gap": 1.0, "min_score": 0.0, "follow": 1})
+
+    def found(where):
+        closer = LoopCloser(room.CAMERA, "thumbnail", config, worker=where)
+        factors = []
+        for frame in room.frames(room.poses()[:30:3]):
+            factors += closer.add(X(frame.index), frame.color, frame.depth, np.eye(4), timestamp=0.5 * frame.index)
+        factors += closer.poll(wait=True)
+        closer.close()
+        assert factors == [closure.factor for closure in closer.closures]
+        return [(*factor.keys(), factor.measured().matrix().tobytes()) for factor in factors]
+
+    assert found(worker) == found("none")
+    assert found("none")
+
+
+def test_an_unknown_worker_is_one_sentence(room):
+    with pytest.raises(ConfigError, match="no worker 'gpu'"):
+        LoopCloser(room.CAMERA, worker="gpu")
 
 
 def test_own_noise_and_kernel(room):
