@@ -3,15 +3,18 @@
 from dataclasses import dataclass
 from pathlib import Path
 
+import cv2
+
 from semslam.loop.segmentation.build import build_segmenter
 from semslam.maps.cloud import fuse_cloud
 from semslam.maps.mesh import fuse_mesh
 from semslam.maps.ply import write_cloud, write_mesh
+from semslam.maps.semantic.plan import draw_plan
 from semslam.maps.semantic.semantic_map import VOXEL, SemanticMap, build_semantic_map, write_semantic_map
 from semslam.runs.results import writing
 from semslam.runs.saved_views import Progress, SavedViews, silent
 
-CLOUD, MESH = "map.ply", "mesh.ply"
+CLOUD, MESH, PLAN = "map.ply", "mesh.ply", "semantic.png"
 DENSE_VOXEL = 0.02
 """Metres, of cloud and mesh: they show what the sensor resolves."""
 
@@ -58,6 +61,9 @@ def write_maps(saved: SavedViews, request: MapRequest, directory: Path, progress
     if request.semantic:
         built = semantic_map(saved, request.voxel, progress)
         written += write_semantic_map(directory, built)
+        if len(built.cloud):
+            cv2.imwrite(str(directory / PLAN), cv2.cvtColor(draw_plan(built), cv2.COLOR_RGB2BGR))
+            written.append(directory / PLAN)
     return written
 
 

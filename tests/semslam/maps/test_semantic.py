@@ -15,6 +15,7 @@ from semslam.geometry.voxels import VoxelTable
 from semslam.loop.segmentation.classes import NYU40_NAMES
 from semslam.maps.semantic.fusion import LabelFusion
 from semslam.maps.semantic.objects import box, find_objects
+from semslam.maps.semantic.plan import WIDTH, draw_plan
 from semslam.maps.semantic.semantic_map import build_semantic_map, write_semantic_map
 from semslam.maps.semantic.smoothing import smooth
 from semslam.maps.views import PosedView, Samples, sample
@@ -146,6 +147,17 @@ def test_the_semantic_map_goes_through_files(room: SyntheticDataset, views: list
     assert sum(thing["points"] for thing in content["objects"]) == (built.owners >= 0).sum()
     with pytest.raises(ResultsError):
         write_semantic_map(tmp_path / "missing", built)
+
+
+def test_a_plan_shows_the_room_from_above(room: SyntheticDataset, views: list[PosedView]) -> None:
+    built = build_semantic_map(views, TrueLabels(room), voxel=0.08)
+    plan = draw_plan(built)
+    assert plan.shape[1] == 2 * WIDTH
+    floor, ceiling = (built.palette[NYU40_NAMES.index(name)] for name in ("floor", "ceiling"))
+    classes = plan[:, WIDTH:]
+    assert np.mean((classes == floor).all(axis=2)) > 0.1
+    assert np.mean((classes == ceiling).all(axis=2)) < 0.01
+    assert np.array_equal(plan, draw_plan(built))
 
 
 def test_a_view_without_labels_or_depth_adds_nothing(room: SyntheticDataset, views: list[PosedView]) -> None:
