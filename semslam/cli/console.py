@@ -119,11 +119,11 @@ def comparison_table(runs: Sequence["Metrics"], title: str) -> Table:
         final = run.optimized
         table.add_row(
             run.detector,
-            _centimetres(run.odometry_only.ate_rmse_m),
-            _centimetres(final.ate_rmse_m),
-            _centimetres(final.ate_max_m),
-            _centimetres(final.rpe_trans_1s_m),
-            _figure(final.rpe_rot_1s_deg),
+            _error(run.odometry_only.ate_rmse_m, "m"),
+            _error(final.ate_rmse_m, "m"),
+            _error(final.ate_max_m, "m"),
+            _error(final.rpe_trans_1s_m, "m"),
+            _error(final.rpe_rot_1s_deg, "deg"),
             _percent(run.tracked / max(run.frames, 1)),
             _counts(run.loops, "proposed", "verified", "accepted").replace(" ", ""),
             _counts(run.loops, "true", "inaccurate", "false").replace(" ", ""),
