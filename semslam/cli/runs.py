@@ -127,7 +127,8 @@ def demo_command(
 def _compare(
     dataset: "Dataset", config: "Config", detectors: Sequence[str], directory: Path, plots: bool, source: str
 ) -> list["Metrics"]:
-    from semslam.runs.results import write_json
+    from semslam.runs.comparison import present_comparison
+    from semslam.runs.results import write_json, writing
 
     runs: list[Metrics] = []
     for name in detectors:
@@ -135,6 +136,9 @@ def _compare(
         write_json(directory / "compare.json", [run.model_dump(mode="json") for run in runs])
         if runs[-1].interrupted:
             break
+    if plots:
+        with writing(directory):
+            present_comparison(directory)
     out.print(metrics_table(runs, f"{dataset.name}: {runs[0].frames} frames"))
     out.print(f"Results: {directory}", soft_wrap=True)
     if runs[-1].interrupted:
