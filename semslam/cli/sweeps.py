@@ -144,7 +144,8 @@ def _compare(
     quiet: bool = False,
 ) -> list["Metrics"]:
     """Run each detector on one odometry; what was found is shown even where a later run fails or is interrupted."""
-    from semslam.runs.results import check_writable, write_json
+    from semslam.runs.comparison import present_comparison
+    from semslam.runs.results import check_writable, write_json, writing
     from semslam.studies.sweep.engine import run_jobs
     from semslam.studies.sweep.plan import comparison_jobs
 
@@ -171,6 +172,9 @@ def _compare(
     failures = [f"{outcome.case.detector}: {outcome.failure}" for outcome in found.values() if outcome.failure]
     if failures:
         raise ResultsError(" ".join(failures))
+    if plots:
+        with writing(directory):
+            present_comparison(directory)
     return metrics()
 
 
