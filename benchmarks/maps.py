@@ -14,10 +14,10 @@ that the same search finds in a map of true labels and true poses. One is found 
 0.3 m of its centroid, misplaced if within 1 m, else missed; objects of the run that no true one takes are invented.
 
 ``changes`` compares the second pass with the first, as ``semslam diff RUN --at`` does. The true changes are the parts
-that stand in one of the two scenes alone, joined to things where they touch. One counts if the keyframes show at least
-400 square centimetres of it in the pass where it stands, where the other pass looks through (by true poses). A
-difference that was found is right, whether it had to be found or not, if its centre lies within 15 cm of the box around a true one of its kind; one that
-moved counts twice, as gone there and new here.
+that stand in one of the two scenes alone, joined to things where they touch. One has to be found if the keyframes show
+at least 400 square centimetres of it in the pass where it stands, where the other pass looks through (by true poses).
+A difference that was found is right, whether it had to be found or not, if its centre lies within 15 cm of the box
+around a true one of its kind; one that moved counts twice, as gone there and new here.
 """
 
 import argparse
