@@ -1,5 +1,6 @@
 """semslam map, on a saved run of the rendered room."""
 
+import json
 import shutil
 from pathlib import Path
 
@@ -57,3 +58,17 @@ def test_a_map_needs_a_run_and_its_images(semslam: Call, saved: Path, tmp_path: 
     outcome = semslam("map", tmp_path / "moved")
     assert outcome.code == 2
     assert "--sequence" in outcome.err
+
+
+def test_two_parts_of_one_run_that_see_the_same_hold_no_change(semslam: Call, saved: Path, tmp_path: Path) -> None:
+    outcome = semslam("diff", saved, "--at", 1.5, "--voxel", 0.1, "--out", tmp_path / "changes.json")
+    assert outcome.code == 0, outcome.err
+    assert json.loads((tmp_path / "changes.json").read_text()) == []
+
+
+def test_diff_needs_two_runs_or_a_stamp_within_one(semslam: Call, saved: Path) -> None:
+    for arguments, complaint in (((), "--at"), ((saved, "--at", 1.0), "--at"), (("--at", 99.0), "no keyframe between")):
+        outcome = semslam("diff", saved, *arguments)
+        assert outcome.code == 2
+        assert complaint in outcome.err
+        assert "Traceback" not in outcome.err
