@@ -48,7 +48,8 @@ def draw_intervals(groups: Sequence[tuple[str, Sequence[Bar]]]) -> bytes:
                 panel.plot(bar.mean, place, marker, color=color, markersize=6)
             panel.set_yticks(range(len(bars)), [bar.label for bar in bars])
             panel.set_ylim(len(bars) - 0.5, -0.5)
-            panel.set_xlim(left=0)
+            ends = [end for bar in bars for end in (bar.mean, bar.high, bar.alone) if end is not None]
+            panel.set_xlim(0, 1.05 * max(ends) or 1.0)
             panel.set_title(title)
         panels[-1].set_xlabel("ATE RMSE, cm (bar: odometry alone; line: 95 % interval of the mean; diamond: not ours)")
 
