@@ -192,19 +192,26 @@ def judge_detector(name: str, answers: DetectorScores, truth: LoopTruth) -> Dete
 
 
 def draw_curves(curves: Mapping[str, Curve], title: str) -> bytes:
-    """Precision over recall of several detectors as PNG, the best average precision first in the legend."""
+    """Precision over recall of several detectors as PNG, the best average precision first in the legend.
+
+    Without a true pair recall and precision are not defined, and the picture says so in their place.
+    """
+    known = any(curve.recall.max(initial=0.0) > 0 for curve in curves.values())
 
     def draw(figure: Figure) -> None:
         axes = figure.add_subplot()
         looks = {name: (COLORS[i % len(COLORS)], LINES[i // len(COLORS) % len(LINES)]) for i, name in enumerate(curves)}
-        for name, curve in sorted(curves.items(), key=lambda item: -average_precision(item[1])):
+        for name, curve in sorted(curves.items(), key=lambda item: -average_precision(item[1])) if known else ():
             recall = np.concatenate([[0.0], curve.recall])
             precision = np.concatenate([curve.precision[:1], curve.precision])
             color, line = looks[name]
             label = f"{name}: {average_precision(curve):.3f}"
             axes.step(recall, precision, where="pre", color=color, linestyle=line, linewidth=1.8, label=label)
         axes.set(xlabel="recall", ylabel="precision", title=title, xlim=(-0.01, 1.01), ylim=(0, 1.02))
-        axes.legend(title="average precision", loc="lower left", alignment="left")
+        if known:
+            axes.legend(title="average precision", loc="lower left", alignment="left")
+        else:
+            axes.text(0.5, 0.5, "no true pair: precision and recall are not defined", ha="center", va="center")
 
     return render(draw, (7.0, 5.4))
 

@@ -31,8 +31,8 @@ def map_command(
     sequence: Sequence = None,
 ) -> None:
     """Make the maps of a saved run again from its keyframes' images."""
+    from semslam.runs.files import check_place
     from semslam.runs.mapping import MapRequest, write_maps
-    from semslam.runs.results import check_place
     from semslam.runs.saved_views import open_saved
 
     saved = open_saved(run, sequence)
@@ -54,7 +54,7 @@ def diff_command(
     """Find the things that moved, went or came between two runs, or two parts of one."""
     from semslam.runs.alignment import align_runs
     from semslam.runs.differences import find_changes, write_changes
-    from semslam.runs.results import check_place
+    from semslam.runs.files import check_place
     from semslam.runs.saved_views import open_saved
 
     if (after is None) is (at is None):
