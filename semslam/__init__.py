@@ -4,6 +4,7 @@ Names are imported when they are first used (PEP 562): the packages below this o
 ``import semslam`` must not pull in torch, open3d or gtsam. A type checker reads the imports below instead.
 """
 
+import os
 from importlib import import_module
 from typing import TYPE_CHECKING
 
@@ -16,6 +17,9 @@ if TYPE_CHECKING:
     from semslam.system.closer import LoopCloser
     from semslam.system.slam import Slam
     from semslam.types import Frame, Intrinsics, Trajectory
+
+# Before any module can import onnxruntime: it would send telemetry. semslam sends nothing.
+os.environ["ORT_DISABLE_TELEMETRY"] = "1"
 
 __version__ = "0.1.0"
 

@@ -194,15 +194,18 @@ def judge_detector(name: str, answers: DetectorScores, truth: LoopTruth) -> Dete
 def draw_curves(curves: Mapping[str, Curve], title: str, settings: PictureSettings = PLAIN) -> bytes:
     """Precision over recall of several detectors, the best average precision first in the legend.
 
+    Without a true pair recall and precision are not defined, and the picture says so in their place.
+
     Raises:
         ConfigError: the font is not installed.
     """
+    known = any(curve.recall.max(initial=0.0) > 0 for curve in curves.values())
 
     def draw(figure: Figure) -> None:
         axes = figure.add_subplot()
         strokes = dict(zip(curves, cycle(SERIES), strict=False))
         markers = dict(zip(curves, cycle(MARKERS), strict=False))
-        for name, curve in sorted(curves.items(), key=lambda item: -average_precision(item[1])):
+        for name, curve in sorted(curves.items(), key=lambda item: -average_precision(item[1])) if known else ():
             recall = np.concatenate([[0.0], curve.recall])
             precision = np.concatenate([curve.precision[:1], curve.precision])
             stroke = strokes[name]
@@ -212,7 +215,10 @@ def draw_curves(curves: Mapping[str, Curve], title: str, settings: PictureSettin
                 label=f"{name}: {average_precision(curve):.3f}",
             )  # fmt: skip
         axes.set(xlabel="recall", ylabel="precision", title=settings.titled(title), xlim=(-0.01, 1.01), ylim=(0, 1.02))
-        figure.legend(title="average precision", loc="outside right upper", alignment="left")
+        if known:
+            figure.legend(title="average precision", loc="outside right upper", alignment="left")
+        else:
+            axes.text(0.5, 0.5, "no true pair: precision and recall are not defined", ha="center", va="center")
 
     return render(draw, (8.4, 5.2), settings)
 

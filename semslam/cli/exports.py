@@ -40,7 +40,7 @@ def export_command(
 ) -> None:
     """Write a run in the format of another tool."""
     from semslam.datasets.trajectory_formats import TrajectoryFormat, write_poses
-    from semslam.runs.results import writing
+    from semslam.runs.files import writing
 
     place = out_path or source.with_name(f"{source.resolve().stem}-{target}{SUFFIXES.get(target, '')}")
     if target.value in {form.value for form in TrajectoryFormat}:
@@ -99,8 +99,8 @@ def _write_images(run: "SavedRun", target: Target, directory: Path, sequence: st
     from semslam.datasets import open_dataset
     from semslam.runs.export.colmap import write_colmap
     from semslam.runs.export.nerfstudio import write_nerfstudio
+    from semslam.runs.files import writing
     from semslam.runs.recording import read_source
-    from semslam.runs.results import writing
 
     source = sequence or read_source(run.directory)
     if source is None:

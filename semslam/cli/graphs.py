@@ -37,7 +37,7 @@ def ledger_command(
         raise ConfigError(f"There is no verdict '{verdict}'. Known: {', '.join(LoopOutcome)}.")
     chosen = [
         entry
-        for entry in read_ledger(run / "loops.jsonl")
+        for entry in read_ledger(run)
         if verdict in (None, entry.verdict)
         and reason in (None, entry.reason)
         and truth in (None, entry.truth and entry.truth.judgement)

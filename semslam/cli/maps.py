@@ -32,8 +32,9 @@ def map_command(
     sequence: Sequence = None,
 ) -> None:
     """Make the maps of a saved run again from its keyframes' images."""
+    from semslam.runs.files import check_place
+    from semslam.runs.manifest import seal_again
     from semslam.runs.mapping import MapRequest, write_maps
-    from semslam.runs.results import check_place
     from semslam.runs.saved_views import open_saved
 
     saved = open_saved(run, sequence)
@@ -41,6 +42,8 @@ def map_command(
     check_place(directory)
     with bar(f"{saved.dataset.name} map", None, "keyframes") as update:
         written = write_maps(saved, MapRequest(voxel, mesh, semantic), directory, update)
+    if out_directory is None:
+        seal_again(run)
     for path in written:
         out.print(f"Written: {path}", soft_wrap=True)
 
@@ -55,7 +58,7 @@ def diff_command(
     """Find the things that moved, went or came between two runs, or two parts of one."""
     from semslam.runs.alignment import align_runs
     from semslam.runs.differences import find_changes, write_changes
-    from semslam.runs.results import check_place
+    from semslam.runs.files import check_place
     from semslam.runs.saved_views import open_saved
 
     if (after is None) is (at is None):

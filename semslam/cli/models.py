@@ -40,7 +40,7 @@ def segment_command(
 
     from semslam.loop.segmentation.build import build_segmenter
     from semslam.loop.segmentation.overlay import draw_overlay
-    from semslam.runs.results import writing
+    from semslam.runs.files import writing
 
     images = list(_image_names(path))[::every]
     segmenter = build_segmenter(options.settings(config, overrides))
@@ -65,7 +65,7 @@ def train_command(
 ) -> None:
     """Train the segmentation network; a killed training goes on where it stopped."""
     from semslam.loop.segmentation.training.training import train
-    from semslam.runs.results import writing
+    from semslam.runs.files import writing
 
     chosen = options.settings(config, overrides, seed=seed)
     with writing(out_directory), bar("training", None, "steps") as update:
@@ -86,7 +86,7 @@ def average_command(
 ) -> None:
     """Average the weights of trained segmentation networks into one network."""
     from semslam.loop.segmentation.network.averaging import average
-    from semslam.runs.results import writing
+    from semslam.runs.files import writing
 
     chosen = options.settings(config, overrides)
     with writing(out_directory):

@@ -25,8 +25,10 @@ def report_command(
 ) -> None:
     """Write the plots and the report of a saved run or comparison again."""
     from semslam.runs.comparison import is_comparison, present_comparison
+    from semslam.runs.files import check_place, writing
+    from semslam.runs.manifest import seal_again
     from semslam.runs.presentation import present
-    from semslam.runs.results import check_place, read_run, writing
+    from semslam.runs.results import read_run
     from semslam.runs.saved_views import find_images
 
     check_place(run)
@@ -38,6 +40,7 @@ def report_command(
             if problem is not None:
                 remark(f"The report goes without images: {problem}")
             present(read_run(run), dataset)
+            seal_again(run)
     out.print(f"Written: {run / 'report.html'}", soft_wrap=True)
 
 
@@ -52,8 +55,9 @@ def plot_command(
 ) -> None:
     """Draw the pictures of a saved run for a paper; of several runs, one picture with all of them."""
     from semslam.runs.comparison import write_comparison_plots
+    from semslam.runs.files import check_place, writing
     from semslam.runs.presentation import write_plots
-    from semslam.runs.results import check_place, read_run, writing
+    from semslam.runs.results import read_run
 
     wanted = _settings(formats, size, font, font_size, title)
     saved = [read_run(run) for run in runs]

@@ -1,5 +1,6 @@
 """semslam run."""
 
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -7,15 +8,12 @@ import typer
 
 from semslam.cli import options
 from semslam.cli.command import Command, example
-from semslam.cli.console import frame_progress, metrics_table, out, remark, remarks
-from semslam.cli.progress import bar
-from semslam.errors import ConfigError, ResultsError
+from semslam.cli.console import remark
+from semslam.cli.running import Task, carry_out, end, show
+from semslam.errors import ConfigError
 
 if TYPE_CHECKING:
-    from semslam.config import Config
-    from semslam.datasets.dataset import Dataset
-    from semslam.runs.metrics import Metrics
-    from semslam.runs.recording import Recording, SavedFrontEnd
+    from semslam.runs.recording import SavedFrontEnd
     from semslam.viewers.viewer import Viewer
 
 OutDirectory = Annotated[Path | None, typer.Option("--out", help="The run folder itself (default: runs/...).")]
@@ -41,12 +39,35 @@ def run_command(
     plots: options.Plots = True,
     visualize: Visualize = False,
     rerun_file: RerunFile = None,
+    resume: Annotated[
+        Path | None, typer.Option("--resume", help="A run folder whose run was killed: goes on with it.")
+    ] = None,
 ) -> None:
     """Run SLAM over a sequence and write a run folder."""
     from semslam.datasets import open_dataset
+    from semslam.runs.place import link_latest, reserved, reserved_anew
     from semslam.runs.recording import read_front_end
-    from semslam.runs.results import link_latest, new_run_directory
+    from semslam.runtime.stopping import stop_on_signals
 
+    if resume is not None:
+        if any(
+            (
+                detector,
+                odometry,
+                saved_run,
+                out_directory,
+                config,
+                overrides,
+                seed,
+                start,
+                max_frames,
+                loader,
+                stride > 1,
+            )
+        ):
+            raise ConfigError("--resume takes all settings from the run's journal; only the sequence may be named.")
+        _resume(resume, sequence)
+        return
     saved = None if saved_run is None else read_front_end(saved_run)
     recording = None if saved is None else saved.recording
     if saved_run is not None and config is not None:
@@ -57,19 +78,51 @@ def run_command(
     if saved is not None:
         saved.check_settings(chosen)
     dataset = open_dataset(source, config=chosen.dataset)
-    directory = out_directory or new_run_directory(options.RUNS, dataset.name, chosen.detector)
-    viewer = _viewer(directory.name, rerun_file, visualize)
-    metrics = _run_one(dataset, chosen, directory, plots, source, recording, viewer)
-    if viewer is not None:
-        viewer.close()
+    frames = len(dataset)
     if out_directory is None:
-        link_latest(directory)
-    out.print(metrics_table([metrics], f"{dataset.name}: {metrics.frames} frames"))
-    out.print(f"Results: {directory}", soft_wrap=True)
-    if recording is not None and recording.interrupted:
-        remark(f"The saved run was interrupted; its {metrics.frames} frames of {len(dataset)} were used.")
-    elif metrics.interrupted:
-        raise KeyboardInterrupt
+        reservation = reserved_anew(options.RUNS, dataset.name, chosen.detector, frames)
+    else:
+        reservation = reserved(out_directory, frames)
+    with stop_on_signals() as stop:
+        with reservation as place:
+            viewer = _viewer(place.directory.name, rerun_file, visualize)
+            task = Task(dataset, chosen, source, plots, sys.argv, saved_run, recording, viewer)
+            done = carry_out(task, place, stop)
+        if viewer is not None:
+            viewer.close()
+        if out_directory is None:
+            link_latest(options.RUNS, done.directory)
+        show(done, task)
+        end(done, task, stop)
+
+
+def _resume(directory: Path, sequence: str | None) -> None:
+    """Go on with a run that was killed, as its journal has it."""
+    from semslam.config import load_saved_config
+    from semslam.datasets import open_dataset
+    from semslam.runs.journal import JOURNAL, read_journal
+    from semslam.runs.place import link_latest, reopened
+    from semslam.runs.recording import read_front_end
+    from semslam.runtime.stopping import stop_on_signals
+
+    with stop_on_signals() as stop:
+        with reopened(directory) as place:
+            past = read_journal(place.work / JOURNAL)
+            header = past.header
+            settings = place.work / "config.yaml"
+            settings.write_text(header.config, encoding="utf-8")
+            config = load_saved_config(settings)
+            saved_run = None if header.saved_run is None else Path(header.saved_run)
+            recording = None if saved_run is None else read_front_end(saved_run).recording
+            source = sequence or header.source
+            dataset = open_dataset(source, config=config.dataset)
+            task = Task(dataset, config, source, header.plots, header.command, saved_run, recording)
+            remark(f"Goes on with a run of {len(past.frames)} frames; they are tracked again, their loops are known.")
+            done = carry_out(task, place, stop, past)
+        if done.directory.resolve().parent == options.RUNS.resolve():
+            link_latest(options.RUNS, done.directory)
+        show(done, task)
+        end(done, task, stop)
 
 
 def _viewer(name: str, file: Path | None, live: bool) -> "Viewer | None":
@@ -90,36 +143,6 @@ def _source(sequence: str | None, saved: "SavedFrontEnd | None") -> str:
     if saved.source is None:
         raise ConfigError("The saved run does not tell where its images are; name the sequence beside --from.")
     return saved.source
-
-
-def _run_one(
-    dataset: "Dataset",
-    config: "Config",
-    directory: Path,
-    plots: bool,
-    source: str,
-    recording: "Recording | None" = None,
-    viewer: "Viewer | None" = None,
-) -> "Metrics":
-    from semslam.runs.pipeline import replay, run
-    from semslam.runs.results import check_writable, write_run
-
-    check_writable(directory)
-    with bar(f"{dataset.name} {config.detector}", len(dataset)) as update:
-        progress = frame_progress(update, len(dataset))
-        if recording is None:
-            result = run(dataset, config, progress, viewer)
-        else:
-            result = replay(dataset, recording, config, progress, viewer=viewer)
-    remarks(result.notes)
-    try:
-        write_run(result, dataset, directory, plots, source)
-    except ResultsError:
-        # Hours of tracking must not die with a full disk: show what was found before saying so.
-        remark("The run is finished, but could not be saved.")
-        out.print(metrics_table([result.metrics], dataset.name))
-        raise
-    return result.metrics
 
 
 COMMANDS = (

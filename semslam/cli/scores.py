@@ -74,7 +74,7 @@ def loops_command(
     from semslam.datasets import open_dataset
     from semslam.eval.loops.precision_recall import draw_curves
     from semslam.eval.loops.reliability import draw_reliability
-    from semslam.runs.results import check_place, write_json, writing
+    from semslam.runs.files import check_place, write_json, writing
     from semslam.studies.detectors import PROBABILISTIC, compare_detectors
 
     chosen = options.settings(config, overrides, odometry, loader=loader, start=start, max_frames=max_frames)
@@ -128,7 +128,7 @@ def pairs_command(
     seed: options.Seed = None,
 ) -> None:
     """Tell the same place from look-alikes under changes of viewpoint, light and objects."""
-    from semslam.runs.results import check_place, writing
+    from semslam.runs.files import check_place, writing
     from semslam.studies.detectors import PROBABILISTIC
     from semslam.studies.pairs import PairPlan, try_pairs
 
@@ -154,7 +154,7 @@ def _write_pairs(trial: "PairTrial", directory: Path) -> None:
     """Write pairs.json, tables of all pairs and of all kinds of change, and a sheet of examples for each set."""
     from semslam.eval.pairs.sheet import draw_sheet
     from semslam.eval.pairs.table import kind_rows, pair_rows, told_by_kind
-    from semslam.runs.results import write_json, writing
+    from semslam.runs.files import write_json, writing
 
     write_json(directory / "pairs.json", {"detectors": [asdict(quality) for quality in trial.qualities]})
     with writing(directory):

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Sequence
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager, ExitStack, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from semslam.studies.sweep.plan import Job
     from semslam.studies.sweep.work import Outcome
 
+DEMO = options.RUNS / "demo"
 DEMO_SEQUENCE = "synthetic:house"
 DEMO_DETECTORS = "none,semantic"
 DEMO_ODOMETRY = "feature"
@@ -49,27 +50,31 @@ def compare_command(
 ) -> None:
     """Track a sequence once, run each detector on that, and print the figures side by side."""
     from semslam.datasets import open_dataset
-    from semslam.runs.results import link_latest, new_run_directory
+    from semslam.runs.place import link_latest, new_directory
 
     chosen = options.settings(config, overrides, odometry, None, seed, loader, start, max_frames, stride)
     dataset = open_dataset(sequence, config=chosen.dataset)
-    directory = out_directory or new_run_directory(options.RUNS, dataset.name, "compare")
+    directory = out_directory or new_directory(options.RUNS, dataset.name, "compare")
     names = options.detector_names(detectors)
     runs = _compare(sequence, dataset.name, chosen, names, directory, plots, jobs, quiet=as_json)
     if as_json:
         typer.echo(json.dumps([run.model_dump(mode="json") for run in runs]))
     if out_directory is None:
-        link_latest(directory)
+        link_latest(options.RUNS, directory / names[-1])
 
 
 def demo_command(
-    out_directory: Annotated[Path, typer.Option("--out", help="Folder of the run folders.")] = options.RUNS / "demo",
+    out_directory: Annotated[Path, typer.Option("--out", help="Folder of the run folders.")] = DEMO,
     seed: options.Seed = None,
 ) -> None:
     """Run the embedded sequence without and with semantic loops, and show what the loops bring."""
+    from semslam.runs.place import link_latest
+
     chosen = options.settings(odometry=DEMO_ODOMETRY, seed=seed)
     names = options.detector_names(DEMO_DETECTORS)
     alone, closed = _compare(DEMO_SEQUENCE, DEMO_SEQUENCE, chosen, names, out_directory, plots=True)
+    if out_directory == DEMO:
+        link_latest(options.RUNS, out_directory / names[-1])
     before, after = alone.optimized.ate_rmse_m, closed.optimized.ate_rmse_m
     if before is not None and after is not None:
         out.print(
@@ -100,7 +105,7 @@ def bench_command(
     """Run a suite and write tables of it."""
     import yaml
 
-    from semslam.runs.results import writing
+    from semslam.runs.files import writing
     from semslam.studies.sweep.engine import run_jobs
     from semslam.studies.sweep.files import summary_values, write_results
     from semslam.studies.sweep.others import external_results, published_results
@@ -145,13 +150,15 @@ def _compare(
 ) -> list["Metrics"]:
     """Run each detector on one odometry; what was found is shown even where a later run fails or is interrupted."""
     from semslam.runs.comparison import present_comparison
-    from semslam.runs.results import check_writable, write_json, writing
+    from semslam.runs.files import write_json, writing
+    from semslam.runs.place import reserved
     from semslam.studies.sweep.engine import run_jobs
     from semslam.studies.sweep.plan import comparison_jobs
 
     plan = comparison_jobs(source, name, config, detectors, directory, plots)
-    for job in plan:
-        check_writable(job.directory)
+    with ExitStack() as places:  # what would keep one from being written is found out before the first run
+        for job in plan:
+            places.enter_context(reserved(job.directory))
     found: dict[str, Outcome] = {}
 
     def metrics() -> list["Metrics"]:
@@ -205,7 +212,7 @@ def _externals(texts: Sequence[str] | None) -> dict[str, str]:
 
 def _claim(directory: Path, text: str) -> None:
     """Make a suite's folder, or make sure that what is there is one."""
-    from semslam.runs.results import writing
+    from semslam.runs.files import writing
 
     with writing(directory):
         if directory.exists() and any(directory.iterdir()) and not (directory / "suite.yaml").exists():

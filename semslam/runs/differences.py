@@ -10,7 +10,7 @@ from semslam.loop.segmentation.build import build_segmenter
 from semslam.maps.changes import Change, ChangedThing, compare
 from semslam.maps.semantic.semantic_map import VOXEL, build_semantic_map
 from semslam.maps.views import PosedView
-from semslam.runs.results import write_json
+from semslam.runs.files import write_json
 from semslam.runs.saved_views import Progress, SavedViews, silent
 from semslam.types import FloatArray
 

@@ -11,7 +11,7 @@ from semslam.maps.mesh import fuse_mesh
 from semslam.maps.ply import write_cloud, write_mesh
 from semslam.maps.semantic.plan import draw_plan
 from semslam.maps.semantic.semantic_map import VOXEL, SemanticMap, build_semantic_map, write_semantic_map
-from semslam.runs.results import writing
+from semslam.runs.files import writing
 from semslam.runs.saved_views import Progress, SavedViews, silent
 
 CLOUD, MESH, PLAN = "map.ply", "mesh.ply", "semantic.png"

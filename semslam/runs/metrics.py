@@ -52,6 +52,7 @@ class Metrics(_Record):
         loops: what became of the candidates.
         time: seconds and memory.
         interrupted: whether the run was stopped before the last frame.
+        error: what stopped it, where that was an error.
     """
 
     sequence: str
@@ -72,3 +73,4 @@ class Metrics(_Record):
     loops: LoopMetrics
     time: TimeMetrics
     interrupted: bool = False
+    error: str | None = None

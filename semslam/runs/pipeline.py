@@ -11,13 +11,15 @@ from semslam.config import Config
 from semslam.datasets.dataset import Dataset
 from semslam.datasets.plausibility import check_plausibility
 from semslam.datasets.prefetch import prefetch
-from semslam.errors import DatasetError
+from semslam.errors import DatasetError, SemslamError
 from semslam.eval.trajectory import coverage_remark
 from semslam.loop.verification.verifier import LoopVerifier
 from semslam.maps.cloud import join_clouds
+from semslam.runs.journal import Journal, JournalError
 from semslam.runs.metrics import Metrics, TimeMetrics
 from semslam.runs.recording import RecordedFrame, Recording, checksum
 from semslam.runs.scoring import Scores, score_run
+from semslam.runtime.stopping import Stop
 from semslam.runtime.stopwatch import Stopwatch
 from semslam.runtime.workers import WorkerKind
 from semslam.system.closing import KeyframeAnswer
@@ -65,8 +67,26 @@ class RunResult:
     notes: tuple[str, ...]
 
 
+class PartialRunError(SemslamError):
+    """An error ended a run after its first tracked frame.
+
+    Attributes:
+        result: what was computed until then, optimised and scored.
+    """
+
+    def __init__(self, sentence: str, result: RunResult) -> None:
+        super().__init__(sentence)
+        self.result = result
+
+
 def run(
-    dataset: Dataset, config: Config | None = None, progress: Progress = _silent, viewer: Viewer | None = None
+    dataset: Dataset,
+    config: Config | None = None,
+    progress: Progress = _silent,
+    viewer: Viewer | None = None,
+    stop: Stop | None = None,
+    journal: Journal | None = None,
+    verifier: LoopVerifier | None = None,
 ) -> RunResult:
     """Run SLAM over a dataset.
 
@@ -78,14 +98,18 @@ def run(
         config: settings; the defaults if None.
         progress: called after each frame with its index and its state (None if it was unreadable).
         viewer: is shown the run as it goes; None = nobody.
+        stop: says between frames whether the sequence is to end early, as Ctrl-C does.
+        journal: takes what is found as it is found.
+        verifier: decides on candidates; None = the registered one.
 
     Raises:
         ConfigError: a name or setting is unknown.
         ModelError: the network's weights are missing or damaged.
         DatasetError: no frame at all could be read or tracked.
+        PartialRunError: anything went wrong after the first tracked frame; it holds what there is.
     """
-    with closing(_Session(dataset, config or Config(), viewer=viewer)) as session:
-        session.drive(session.track(), progress)
+    with closing(_Session(dataset, config or Config(), verifier, viewer, journal)) as session:
+        session.drive(session.track(), progress, stop or Stop())
         return session.result()
 
 
@@ -96,6 +120,8 @@ def replay(
     progress: Progress = _silent,
     verifier: LoopVerifier | None = None,
     viewer: Viewer | None = None,
+    stop: Stop | None = None,
+    journal: Journal | None = None,
 ) -> RunResult:
     """Repeat detection, verification and back end on a saved front end; images are read at keyframes alone.
 
@@ -108,15 +134,18 @@ def replay(
         progress: called after each frame with its index and its state.
         verifier: decides on candidates; none = the built-in one.
         viewer: is shown the run as it goes; None = nobody.
+        stop: says between frames whether the sequence is to end early.
+        journal: takes what is found as it is found.
 
     Raises:
         ConfigError: a name or setting is unknown.
         ModelError: the network's weights are missing or damaged.
-        DatasetError: it is another sequence, or a keyframe's image cannot be read.
+        DatasetError: it is another sequence.
+        PartialRunError: anything went wrong after the first frame, such as a keyframe whose image cannot be read.
     """
     recording.check(dataset)
-    with closing(_Session(dataset, config, verifier, viewer)) as session:
-        session.drive(session.repeat(recording), progress)
+    with closing(_Session(dataset, config, verifier, viewer, journal)) as session:
+        session.drive(session.repeat(recording), progress, stop or Stop())
         return session.result()
 
 
@@ -129,8 +158,9 @@ class _Session:
         config: Config,
         verifier: LoopVerifier | None = None,
         viewer: Viewer | None = None,
+        journal: Journal | None = None,
     ) -> None:
-        self._dataset, self._config = dataset, config
+        self._dataset, self._config, self._journal = dataset, config, journal
         self._viewer = viewer or NoViewer()
         self._stopwatch, self._clock = Stopwatch(), _Clock()
         worker = _worker(config, len(dataset))
@@ -139,6 +169,8 @@ class _Session:
         self._checksum = 0
         self._interrupted = False
         self._looks = False  # at the sequence; a replay leaves the images alone, which were looked at when recorded
+        self._done = self._tracked = 0
+        self._failure: Exception | None = None
 
     def track(self) -> Iterator[tuple[int, FrameState | None]]:
         """Read and track every frame."""
@@ -171,7 +203,9 @@ class _Session:
             self._viewer.keyframe(KeyframeScene(keyframe, frame, state.motion.observations))
 
     def _show_answer(self, answer: KeyframeAnswer) -> None:
-        """Show the viewer what became of a keyframe."""
+        """Show the viewer what became of a keyframe, and note it."""
+        if self._journal is not None:
+            self._journal.outcomes(answer.verifications)
         loops = tuple(
             ShownLoop(v.candidate.query, v.candidate.match, isinstance(v, LoopConstraint)) for v in answer.verifications
         )
@@ -181,21 +215,61 @@ class _Session:
         """End what runs beside tracking."""
         self._slam.close()
 
-    def drive(self, states: Iterable[tuple[int, FrameState | None]], progress: Progress) -> None:
-        """Take frame after frame until the last, or until Ctrl-C."""
+    def drive(self, states: Iterable[tuple[int, FrameState | None]], progress: Progress, stop: Stop) -> None:
+        """Take frame after frame until the last, until asked to stop, or until something goes wrong."""
         try:
-            for index, state in states:
-                progress(index, state)
+            with stop.breakable():
+                for index, state in states:
+                    self._done = index + 1
+                    if state is not None:
+                        self._tracked += 1
+                        if self._journal is not None:
+                            self._journal.frame(state)
+                    progress(index, state)
+                    if stop.requested:
+                        self._interrupted |= self._done < len(self._dataset)
+                        break
         except KeyboardInterrupt:
             self._interrupted = True
+        except JournalError:
+            raise
+        except Exception as error:  # whatever a dataset, a plug-in or a library may raise: nothing computed is lost
+            if not self._tracked:
+                raise _as_our_own(error) from error
+            self._interrupted, self._failure = True, error
 
     def result(self) -> RunResult:
-        """Optimise, score and join what was found."""
-        if not self._slam.keyframes:
+        """Optimise, score and join what was found.
+
+        Raises:
+            DatasetError: there is nothing.
+            PartialRunError: the sequence was ended by an error.
+        """
+        if not self._tracked:
             raise DatasetError((*self._unreadable, f"No frame of {self._dataset.name} could be tracked.")[0])
-        slam = self._slam.finish()
+        slam = self._finished()
+        error = None if self._failure is None else f"Frame {self._done} ended the run: {_as_our_own(self._failure)}"
+        result = self._joined(slam, error)
+        if error is not None:
+            raise PartialRunError(error, result) from self._failure
+        return result
+
+    def _finished(self) -> SlamResult:
+        """The optimised run; where a keyframe's loops could not be closed, without the loops from there on."""
+        try:
+            return self._slam.finish()
+        except Exception as error:  # what a detector, a segmenter or a verifier raised, perhaps in another process
+            self._slam.leave_pending()
+            self._interrupted, self._failure = True, self._failure or error
+        try:
+            return self._slam.finish()
+        except Exception as error:
+            raise _as_our_own(error) from error
+
+    def _joined(self, slam: SlamResult, error: str | None) -> RunResult:
         times = self._clock.read(len(slam.frames), self._stopwatch)
-        scores = score_run(self._dataset, self._config, slam, len(self._unreadable), self._interrupted, times)
+        unreadable = len(self._unreadable)
+        scores = score_run(self._dataset, self._config, slam, unreadable, times, self._interrupted, error)
         self._viewer.finish(partial(_finished, slam, scores, self._dataset.ground_truth))
         return RunResult(
             config=self._config,
@@ -212,7 +286,14 @@ class _Session:
                 self._interrupted,
                 self._checksum,
             ),
-            notes=(*self._doubts(slam, scores.metrics), *self._dataset.notes, *self._unreadable, *slam.notes),
+            notes=(
+                *self._doubts(slam, scores.metrics),
+                *self._dataset.notes,
+                *self._unreadable,
+                *slam.notes,
+                *([] if error is None else [error]),
+                *([] if self._journal is None or self._journal.note is None else [self._journal.note]),
+            ),
         )
 
     def _doubts(self, slam: SlamResult, metrics: Metrics) -> list[str]:
@@ -239,6 +320,15 @@ def _finished(slam: SlamResult, scores: Scores, ground_truth: Trajectory | None)
         ledger=scores.ledger,
         map=join_clouds(keyframes, poses),
     )
+
+
+def _as_our_own(error: Exception) -> SemslamError:
+    """An error of any kind as one clear sentence."""
+    if isinstance(error, SemslamError):
+        return error
+    if isinstance(error, MemoryError):
+        return SemslamError("There is not enough memory.")
+    return SemslamError(f"{type(error).__name__}: {' '.join(str(error).split())}.")
 
 
 class _Clock:

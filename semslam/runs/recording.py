@@ -15,6 +15,7 @@ from semslam.datasets.dataset import Dataset
 from semslam.errors import ConfigError, DatasetError, ResultsError
 from semslam.geometry.se3 import is_rigid
 from semslam.plugins import load
+from semslam.runs.manifest import read_manifest
 from semslam.types import Frame, Motion, Observations, TrackingStatus
 
 Arrays = dict[str, npt.NDArray[Any]]
@@ -149,21 +150,22 @@ def read_front_end(directory: Path) -> SavedFrontEnd:
         ResultsError: it is no run folder, was written by an earlier version, or its recording is damaged.
         ConfigError: its settings cannot be read.
     """
-    recording, source = read_recording(directory), read_source(directory)
-    return SavedFrontEnd(load_saved_config(directory / "config.yaml"), recording, source)
+    read_manifest(directory).check(directory, RECORDING, "config.yaml")
+    source = read_source(directory)
+    return SavedFrontEnd(load_saved_config(directory / "config.yaml"), read_recording(directory), source)
 
 
 def read_source(directory: Path) -> str | None:
     """What the sequence of a run folder was opened by; None where that was not written.
 
     Raises:
-        ResultsError: the file that holds it cannot be read.
+        ResultsError: it is no run folder, or the file that holds it is damaged.
     """
-    source = directory / SOURCE
-    try:
-        return source.read_text(encoding="utf-8").strip() if source.exists() else None
-    except (OSError, UnicodeDecodeError) as error:
-        raise ResultsError(f"{source} cannot be read.") from error
+    manifest = read_manifest(directory)
+    if SOURCE not in manifest.files:
+        return None
+    manifest.check(directory, SOURCE)
+    return (directory / SOURCE).read_text(encoding="utf-8").strip()
 
 
 def read_recording(directory: Path) -> Recording:

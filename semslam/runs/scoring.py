@@ -47,7 +47,13 @@ class Scores:
 
 
 def score_run(
-    dataset: Dataset, config: Config, slam: SlamResult, unreadable: int, interrupted: bool, time: TimeMetrics
+    dataset: Dataset,
+    config: Config,
+    slam: SlamResult,
+    unreadable: int,
+    time: TimeMetrics,
+    interrupted: bool = False,
+    error: str | None = None,
 ) -> Scores:
     """Score a run; without ground truth, or where it meets fewer than three poses, the errors are None."""
     truth = dataset.ground_truth
@@ -73,6 +79,7 @@ def score_run(
         loops=_loop_metrics(slam, ledger, truth is not None),
         time=time,
         interrupted=interrupted,
+        error=error,
     )
     return Scores(odometry, live, trajectory, ledger, metrics)
 

@@ -128,8 +128,8 @@ _prepared: list[Callable[[Any], Any] | SemslamError] = []
 
 
 def _obey_the_parent() -> None:
-    """Leave signals to the parent, which a terminal sends Ctrl-C and a hang-up as well, and end when it is gone."""
-    for name in (signal.SIGINT, signal.SIGHUP):
+    """Leave signals that go to all processes of a session to the parent, and end when it is gone."""
+    for name in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(name, signal.SIG_IGN)
     Thread(target=_end_with, args=(os.getppid(),), daemon=True).start()
 

@@ -188,6 +188,10 @@ class Slam:
             notes=tuple(notes),
         )
 
+    def leave_pending(self) -> None:
+        """Do without the loops of keyframes that are still being closed, after one of them has failed."""
+        self._pending.clear()
+
     def close(self) -> None:
         """End what runs beside tracking; the keyframes so far are still finished."""
         if self._closing is not None:

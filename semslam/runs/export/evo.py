@@ -4,7 +4,8 @@ from pathlib import Path
 
 from semslam.errors import TrajectoryError
 from semslam.eval.trajectory import MAX_DIFFERENCE, associate
-from semslam.runs.results import SavedRun, writing
+from semslam.runs.files import writing
+from semslam.runs.results import SavedRun
 
 
 def write_evo_result(run: SavedRun, path: Path) -> None:

@@ -6,7 +6,8 @@ import numpy as np
 
 from semslam.datasets.dataset import Dataset
 from semslam.runs.export.posed_images import DEPTH_SCALE, DEPTHS, IMAGES, write_posed_images
-from semslam.runs.results import SavedRun, write_json
+from semslam.runs.files import write_json
+from semslam.runs.results import SavedRun
 
 FROM_OPENCV = np.diag([1.0, -1.0, -1.0, 1.0])
 """Its cameras look along -z with y up (OpenGL's), ours along z with y down."""

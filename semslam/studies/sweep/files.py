@@ -12,7 +12,7 @@ from typing import Any
 
 from semslam.eval.report.intervals import draw_intervals
 from semslam.eval.report.tables import to_html, to_latex, to_markdown
-from semslam.runs.results import write_json, writing
+from semslam.runs.files import write_json, writing
 from semslam.studies.sweep.tables import SuiteResult, suite_bars, suite_tables
 from semslam.studies.sweep.work import Outcome
 

@@ -4,11 +4,14 @@ from dataclasses import dataclass
 
 from semslam.config import load_saved_config
 from semslam.datasets import open_dataset
+from semslam.datasets.dataset import Dataset
 from semslam.errors import ResultsError, SemslamError
 from semslam.runs.metrics import Metrics
-from semslam.runs.pipeline import Progress, replay, run
+from semslam.runs.pipeline import PartialRunError, Progress, RunResult, replay, run
+from semslam.runs.place import reserved
 from semslam.runs.recording import read_front_end, read_source
-from semslam.runs.results import read_metrics, write_run, writing
+from semslam.runs.results import fill, read_metrics
+from semslam.runtime.stopping import Stop, stop_on_signals
 from semslam.studies.sweep.plan import Case, Job
 
 
@@ -64,18 +67,25 @@ def _finished_before(job: Job) -> Outcome | None:
 
 def _make(job: Job, progress: Progress) -> Outcome:
     dataset = open_dataset(job.source, job.config.dataset)
-    if job.recording is None:
-        result = run(dataset, job.config, progress)
-    else:
-        saved = read_front_end(job.recording)
-        saved.check_settings(job.config)
-        result = replay(dataset, saved.recording, job.config, progress)
-    try:
-        with writing(job.directory):
-            job.directory.parent.mkdir(parents=True, exist_ok=True)
-        write_run(result, dataset, job.directory, job.plots, job.source)
-    except ResultsError as error:
-        return Outcome(job.case, result.metrics, str(error))
-    if result.metrics.interrupted:
+    with stop_on_signals() as stop, reserved(job.directory, len(dataset)) as place:
+        failure = ""
+        try:
+            result = _computed(job, dataset, progress, stop)
+        except PartialRunError as error:
+            result, failure = error.result, str(error)
+        try:
+            with place.results() as work:
+                fill(work, result, dataset, job.plots, job.source)
+        except ResultsError as error:
+            return Outcome(job.case, result.metrics, str(error))
+    if stop.requested or (result.metrics.interrupted and not failure):
         raise KeyboardInterrupt
-    return Outcome(job.case, result.metrics)
+    return Outcome(job.case, result.metrics, failure)
+
+
+def _computed(job: Job, dataset: Dataset, progress: Progress, stop: Stop) -> RunResult:
+    if job.recording is None:
+        return run(dataset, job.config, progress, stop=stop)
+    saved = read_front_end(job.recording)
+    saved.check_settings(job.config)
+    return replay(dataset, saved.recording, job.config, progress, stop=stop)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from matplotlib.axes import Axes
 from sklearn.metrics import average_precision_score
 
 from semslam.eval.loops.precision_recall import (
@@ -135,3 +136,12 @@ def test_curves_are_drawn_the_same_twice() -> None:
     png = draw_curves(curves, "ring")
     assert png[:4] == b"\x89PNG"
     assert png == draw_curves(curves, "ring")
+
+
+def test_without_a_true_pair_no_score_is_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    drawn: list[str] = []
+    step, text = Axes.step, Axes.text
+    monkeypatch.setattr(Axes, "step", lambda *a, **k: drawn.append(k.get("label", "")) or step(*a, **k))
+    monkeypatch.setattr(Axes, "text", lambda *a, **k: drawn.append(str(a[3])) or text(*a, **k))
+    draw_curves({"semantic": precision_recall(np.zeros(4, bool), np.arange(4.0))}, "wall")
+    assert drawn == ["no true pair: precision and recall are not defined"]

@@ -9,6 +9,7 @@ import pytest
 from semslam.backend.graph.g2o import read_g2o, write_g2o
 from semslam.backend.graph.products import Edge, PosedGraph
 from semslam.geometry.se3 import compose, exp_so3, invert, make_transform
+from semslam.runs.manifest import seal
 from tests.conftest import Call
 
 STEP = make_transform(exp_so3([0.0, 0.0, 2 * np.pi / 24]), [0.4, 0.0, 0.0])
@@ -65,6 +66,7 @@ def test_a_ledger_is_filtered(semslam: Call, tmp_path: Path) -> None:
         "truth": {"judgement": "true", "translation_m": 0.1, "rotation_deg": 1.0},
     }
     (tmp_path / "loops.jsonl").write_text(f"{json.dumps(entry)}\n{json.dumps(kept)}\n")
+    seal(tmp_path, "{}")
     assert json.loads(semslam("ledger", tmp_path, "--verdict", "rejected", "--json").out)["reason"] == "few_inliers"
     assert json.loads(semslam("ledger", tmp_path, "--truth", "true", "--json").out)["verdict"] == "accepted"
     assert "2 candidates" in semslam("ledger", tmp_path).out

@@ -10,8 +10,10 @@ import pytest
 
 from semslam.config import Config
 from semslam.errors import DatasetError, GraphError, ResultsError
+from semslam.runs.manifest import seal
 from semslam.runs.pipeline import run
-from semslam.runs.results import new_run_directory, read_ledger, read_run, write_ledger, write_run
+from semslam.runs.place import reserved_anew
+from semslam.runs.results import read_ledger, read_run, write_ledger, write_run
 from semslam.types import LedgerEntry, LoopEvidence, LoopOutcome, NodePair
 from tests.conftest import WallDataset
 
@@ -90,15 +92,8 @@ def test_a_full_disk_is_one_sentence_and_leaves_the_old_run(
     assert [path.name for path in tmp_path.iterdir()] == ["run"]
 
 
-@pytest.mark.parametrize("damage", ["", "{", '{"frames": 3}'])
-def test_a_damaged_run_is_named(tmp_path: Path, damage: str) -> None:
-    (tmp_path / "metrics.json").write_text(damage)
-    with pytest.raises(ResultsError, match="damaged"):
-        read_run(tmp_path)
-
-
 def test_a_folder_that_is_no_run_is_named(tmp_path: Path) -> None:
-    with pytest.raises(ResultsError, match=r"no metrics\.json"):
+    with pytest.raises(ResultsError, match=r"no manifest\.json"):
         read_run(tmp_path)
 
 
@@ -108,20 +103,21 @@ def test_a_ledger_reads_back(tmp_path: Path) -> None:
         9, 1, 90, 10, 9.0, 1.0, "semantic", 0.8, evidence, LoopOutcome.REJECTED, "few_inliers", 7.0, 20.0
     )
     write_ledger(tmp_path / "loops.jsonl", (entry, entry))
-    assert read_ledger(tmp_path / "loops.jsonl") == (entry, entry)
+    seal(tmp_path, "{}")
+    assert read_ledger(tmp_path) == (entry, entry)
     assert json.loads((tmp_path / "loops.jsonl").read_text().splitlines()[0])["reason"] == "few_inliers"
 
 
 def test_a_damaged_ledger_is_named(tmp_path: Path) -> None:
     (tmp_path / "loops.jsonl").write_text("{}\n")
+    seal(tmp_path, "{}")
     with pytest.raises(ResultsError, match="not a line of a loop ledger"):
-        read_ledger(tmp_path / "loops.jsonl")
+        read_ledger(tmp_path)
 
 
 def test_run_folders_never_collide(tmp_path: Path) -> None:
-    first = new_run_directory(tmp_path, "wall", "none")
-    first.mkdir()
-    assert new_run_directory(tmp_path, "wall", "none") != first
+    with reserved_anew(tmp_path, "wall", "none") as first, reserved_anew(tmp_path, "wall", "none") as second:
+        assert first.directory != second.directory
 
 
 def test_what_looks_wrong_with_a_sequence_is_noted_first(wall: WallDataset) -> None:

@@ -10,10 +10,11 @@ import pytest
 from semslam.config import Config
 from semslam.errors import ResultsError
 from semslam.runs.comparison import present_comparison
+from semslam.runs.files import write_json
 from semslam.runs.inliers import FILE, read_inliers, write_inliers
 from semslam.runs.pipeline import run
 from semslam.runs.presentation import changed_settings, present, run_report
-from semslam.runs.results import read_run, write_json, write_run
+from semslam.runs.results import read_run, write_run
 from semslam.types import LoopCandidate, LoopConstraint
 from tests.conftest import WallDataset
 

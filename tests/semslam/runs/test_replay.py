@@ -13,8 +13,16 @@ from semslam.config import Config
 from semslam.datasets import open_dataset
 from semslam.errors import ConfigError, DatasetError, ResultsError
 from semslam.geometry.se3 import exp_so3, make_transform
+from semslam.runs.manifest import seal
 from semslam.runs.pipeline import replay, run
-from semslam.runs.recording import RecordedFrame, Recording, SavedFrontEnd, read_front_end, write_recording
+from semslam.runs.recording import (
+    RecordedFrame,
+    Recording,
+    SavedFrontEnd,
+    read_front_end,
+    read_recording,
+    write_recording,
+)
 from semslam.runs.results import write_run
 from semslam.types import Frame, Motion, Observations, TrackingStatus
 from tests.conftest import Call, WallDataset
@@ -90,6 +98,7 @@ def test_an_interrupted_or_older_run_is_replayed_with_a_remark(semslam: Call, sa
         np.savez(older / "frontend.npz", **dict(file) | {"interrupted": np.array(True)})
     settings_file = older / "config.yaml"
     settings_file.write_text(settings_file.read_text() + "forgotten: 1\n")
+    _reseal(older)
     outcome = semslam("run", "--from", older, "--set", "backend.robust=dcs", "--out", tmp_path / "again", "--no-plots")
     assert outcome.code == 0
     assert "was interrupted; its 8 frames of 8 were used" in outcome.err
@@ -139,10 +148,11 @@ def test_what_cannot_be_replayed_is_one_sentence(semslam: Call, saved: Path, tmp
     (damaged / "frontend.npz").write_bytes(content[: len(content) // 2])
     shutil.copytree(saved, nameless)
     (nameless / "sequence.txt").unlink()
+    _reseal(nameless)
     other = tmp_path / "settings.yaml"
     other.write_text("seed: 1\n")
     for words, complaint in (
-        (("--from", tmp_path), "has no frontend.npz"),
+        (("--from", tmp_path), "no run folder"),
         (("--from", damaged), "is damaged"),
         (("--from", nameless), "does not tell where its images are"),
         (("--from", saved, "--odometry", "dense"), "'odometry' decides the odometry"),
@@ -171,6 +181,7 @@ def test_a_recording_reads_back(
     frames = tuple(_frame(index, data.draw(st.none() | st.integers(0, 4)), rng) for index in range(count))
     recording = Recording(frames, tuple(unreadable), interrupted=True, checksum=2**32 - 1)
     write_recording(directory, recording, str(directory))
+    seal(directory, "{}")
     front_end = read_front_end(directory)
     read = front_end.recording
     assert front_end.source == str(directory)
@@ -199,7 +210,7 @@ def test_a_damaged_recording_is_named(tmp_path: Path, name: str) -> None:
         damaged = arrays[name][1:]
     np.savez(tmp_path / "frontend.npz", **arrays | {name: damaged})
     with pytest.raises(ResultsError, match="is damaged"):
-        read_front_end(tmp_path)
+        read_recording(tmp_path)
 
 
 def test_a_recording_of_another_version_is_named(tmp_path: Path) -> None:
@@ -210,7 +221,7 @@ def test_a_recording_of_another_version_is_named(tmp_path: Path) -> None:
     del arrays["depths"]
     np.savez(tmp_path / "frontend.npz", **arrays)
     with pytest.raises(ResultsError, match="written by another version"):
-        read_front_end(tmp_path)
+        read_recording(tmp_path)
 
 
 def _frame(index: int, seen: int | None, rng: np.random.Generator) -> RecordedFrame:
@@ -221,3 +232,11 @@ def _frame(index: int, seen: int | None, rng: np.random.Generator) -> RecordedFr
     T = make_transform(exp_so3(rng.normal(size=3)), rng.normal(size=3))
     status = list(TrackingStatus)[int(rng.integers(len(TrackingStatus)))]
     return RecordedFrame(2 * index, 0.1 * index, Motion(T, np.eye(6) * rng.random(), status, index, 7, observations))
+
+
+def _reseal(directory: Path) -> None:
+    """Make the manifest that a run with these files would have."""
+    metrics = (directory / "metrics.json").read_text()
+    for name in ("metrics.json", "manifest.json"):
+        (directory / name).unlink()
+    seal(directory, metrics)

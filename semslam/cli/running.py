@@ -1,0 +1,126 @@
+"""How a command carries out a run: it is computed, written and shown, and ends with the exit code that it deserves."""
+
+from collections.abc import Sequence
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+from semslam.cli.console import complain, metrics_table, out, remark, remarks
+from semslam.cli.progress import bar
+from semslam.errors import ResultsError, SemslamError
+
+if TYPE_CHECKING:
+    from semslam.config import Config
+    from semslam.datasets.dataset import Dataset
+    from semslam.runs.journal import JournalContent
+    from semslam.runs.metrics import Metrics
+    from semslam.runs.pipeline import RunResult
+    from semslam.runs.place import RunPlace
+    from semslam.runs.recording import Recording
+    from semslam.runtime.stopping import Stop
+    from semslam.system.result import FrameState
+    from semslam.viewers.viewer import Viewer
+
+NOT_TRACKED = 3
+"""Exit code of a run that tracked next to nothing."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Task:
+    """What is to be run; with a recording, from its motions."""
+
+    dataset: "Dataset"
+    config: "Config"
+    source: str
+    plots: bool
+    command: Sequence[str]
+    saved_run: Path | None = None
+    recording: "Recording | None" = None
+    viewer: "Viewer | None" = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Done:
+    """What became of a run: its folder, its metrics, why it ended early and why it tracked next to nothing."""
+
+    directory: Path
+    metrics: "Metrics"
+    interrupted: bool
+    failure: SemslamError | None
+    shortfall: str | None
+
+
+def carry_out(task: Task, place: "RunPlace", stop: "Stop", past: "JournalContent | None" = None) -> Done:
+    """Run, write, and only then talk: nobody may be listening any more."""
+    from semslam.runs.pipeline import PartialRunError
+    from semslam.runs.results import fill
+    from semslam.runs.shortfall import shortfall
+
+    failure = None
+    try:
+        result = _computed(task, place, stop, past)
+    except PartialRunError as error:
+        result, failure = error.result, error
+    try:
+        with place.results() as work:
+            fill(work, result, task.dataset, task.plots, task.source, task.command)
+    except ResultsError as error:
+        # Hours of tracking must not die with a full disk: show what was found, and keep the journal.
+        out.print(metrics_table([result.metrics], task.dataset.name))
+        raise ResultsError(
+            f"{error} The run is finished, but could not be saved; go on by semslam run --resume {place.directory}."
+        ) from error
+    remarks(result.notes)
+    reason = shortfall(result.metrics, result.slam.keyframes)
+    return Done(place.directory, result.metrics, result.metrics.interrupted, failure, reason)
+
+
+def _computed(task: Task, place: "RunPlace", stop: "Stop", past: "JournalContent | None") -> "RunResult":
+    """Compute a run, with a journal of it beside the run folder."""
+    from semslam.loop.verification.verifier import build_verifier
+    from semslam.runs.files import writing
+    from semslam.runs.journal import JOURNAL, Journal, JournalHeader, RecallingVerifier
+    from semslam.runs.pipeline import replay, run
+
+    source = str(Path(task.source).resolve()) if Path(task.source).exists() else task.source
+    saved_run = None if task.saved_run is None else str(task.saved_run.resolve())
+    header = JournalHeader(task.config.dump(), source, task.plots, saved_run, tuple(task.command))
+    verifier = None if past is None else RecallingVerifier(build_verifier(task.config), past.outcomes)
+    with writing(place.directory):
+        journal = Journal(place.work / JOURNAL, header, past)
+    frames = len(task.dataset)
+    with closing(journal), bar(f"{task.dataset.name} {task.config.detector}", frames) as update:
+
+        def progress(index: int, state: "FrameState | None") -> None:
+            place.kept = True
+            update(index + 1, frames)
+
+        if task.recording is None:
+            return run(task.dataset, task.config, progress, task.viewer, stop, journal, verifier)
+        return replay(task.dataset, task.recording, task.config, progress, verifier, task.viewer, stop, journal)
+
+
+def show(done: Done, task: Task) -> None:
+    """Print what a run found and where it is."""
+    out.print(metrics_table([done.metrics], f"{task.dataset.name}: {done.metrics.frames} frames"))
+    out.print(f"Results: {done.directory}", soft_wrap=True)
+
+
+def end(done: Done, task: Task, stop: "Stop") -> None:
+    """End the command as what ended the run asks for."""
+    if done.failure is not None:
+        raise SemslamError(f"{done.failure} What was tracked until then is in {done.directory}.")
+    if stop.requested:
+        complain("Interrupted." if done.interrupted else "Asked to stop; the run was finished all the same.")
+        raise typer.Exit(stop.exit_code)
+    if task.recording is not None and task.recording.interrupted:
+        frames = f"its {done.metrics.frames} frames of {len(task.dataset)}"
+        remark(f"The saved run was interrupted; {frames} were used.")
+    elif done.interrupted:
+        raise KeyboardInterrupt
+    if done.shortfall is not None:
+        complain(done.shortfall)
+        raise typer.Exit(NOT_TRACKED)

@@ -1,0 +1,57 @@
+"""Files written so that each is whole or not there, with one sentence for what goes wrong."""
+
+import contextlib
+import errno
+import json
+import os
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+from semslam.errors import ResultsError
+
+
+@contextlib.contextmanager
+def writing(path: Path) -> Iterator[None]:
+    """Turn what can go wrong while ``path`` is written into one sentence."""
+    try:
+        yield
+    except OSError as error:
+        raise ResultsError(f"{path} cannot be written: {reason(error)}.") from error
+
+
+def reason(error: OSError) -> str:
+    """Why a file operation failed, in a few words."""
+    full = error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+    return "the disk is full" if full else (error.strerror or str(error)).lower()
+
+
+def write_json(path: Path, value: object) -> None:
+    """Write JSON through a neighbour file, so that the file is whole or not there."""
+    with writing(path):
+        partial = path.with_name(f".{path.name}.partial")
+        partial.write_text(json.dumps(value, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+        partial.replace(path)
+
+
+def check_place(directory: Path) -> None:
+    """Find out before long work whether a folder can be made, or written to where it stands; makes nothing.
+
+    Raises:
+        ResultsError: it cannot.
+    """
+    with writing(directory), tempfile.TemporaryFile(dir=_existing(directory)) as file:
+        file.write(b"semslam")
+
+
+def _existing(directory: Path) -> Path:
+    return next(path for path in (directory, *directory.parents) if path.exists())
+
+
+def sync(path: Path) -> None:
+    """Make a file's content, or a folder's entries, outlive a power cut."""
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
