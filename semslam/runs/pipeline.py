@@ -1,5 +1,6 @@
 """A whole run: dataset -> Slam -> RunResult, or recorded motions in the odometry's place; keeps the time."""
 
+import multiprocessing
 import resource
 import time
 from collections.abc import Callable, Iterable, Iterator
@@ -304,9 +305,13 @@ class _Session:
 
 
 def _worker(config: Config, frames: int) -> WorkerKind:
-    """Where loops are closed; a process takes seconds to start, which a short sequence does not win back."""
+    """Where loops are closed; a process takes seconds to start, which a short sequence does not win back.
+
+    Where runs are made side by side, in processes of their own, each stays in its process.
+    """
     if config.loops.worker == "auto":
-        return WorkerKind.PROCESS if frames >= LONG_SEQUENCE else WorkerKind.NONE
+        is_worth_it = frames >= LONG_SEQUENCE and multiprocessing.parent_process() is None
+        return WorkerKind.PROCESS if is_worth_it else WorkerKind.NONE
     return WorkerKind(config.loops.worker)
 
 

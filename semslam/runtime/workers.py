@@ -1,11 +1,12 @@
 """Work that goes on beside the caller's, one job after the other, in the order in which jobs were submitted."""
 
 import os
+import pickle
 import signal
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from enum import StrEnum
 from threading import Thread
 from typing import Any, Generic, TypeVar
@@ -84,10 +85,11 @@ class ProcessWorker(Worker[Job, Answer]):
     """
 
     def __init__(self, make: Make[Job, Answer]) -> None:
-        from joblib.externals.loky.process_executor import ProcessPoolExecutor
+        from joblib.externals.cloudpickle import dumps
+        from joblib.externals.loky.backend import get_context
 
-        self._pool = ProcessPoolExecutor(max_workers=1, initializer=_obey_the_parent)
-        self._ready: Future[None] = self._pool.submit(_prepare, make)
+        self._pool = ProcessPoolExecutor(max_workers=1, mp_context=get_context("loky"), initializer=_obey_the_parent)
+        self._ready: Future[None] = self._pool.submit(_prepare, dumps(make))
 
     def submit(self, job: Job) -> "Future[Answer]":
         """See ``Worker``."""
@@ -97,6 +99,19 @@ class ProcessWorker(Worker[Job, Answer]):
     def close(self) -> None:
         """See ``Worker``."""
         self._pool.shutdown(wait=True)
+
+
+def answer_of(future: "Future[Answer]") -> Answer:
+    """Wait for the answer of a job.
+
+    Raises:
+        SemslamError: the worker's process has ended.
+        Exception: what the work raised.
+    """
+    try:
+        return future.result()
+    except BrokenExecutor as error:
+        raise SemslamError("The process that works beside this one has ended, perhaps for want of memory.") from error
 
 
 def worker_kind(name: str) -> WorkerKind:
@@ -140,7 +155,8 @@ def _end_with(parent: int) -> None:
     os._exit(1)
 
 
-def _prepare(make: Make[Any, Any]) -> None:
+def _prepare(pickled: bytes) -> None:
+    make: Make[Any, Any] = pickle.loads(pickled)
     try:
         _prepared.append(make())
     except SemslamError as error:

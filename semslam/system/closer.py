@@ -23,7 +23,7 @@ from semslam.geometry.se3 import FloatArray, adjoint, invert
 from semslam.loop.detector import LoopDetector
 from semslam.loop.search import LoopSearch
 from semslam.loop.verification.verifier import LoopVerifier
-from semslam.runtime.workers import WorkerKind, make_worker, worker_kind
+from semslam.runtime.workers import WorkerKind, answer_of, make_worker, worker_kind
 from semslam.types import Frame, Intrinsics, LabelMap, LoopConstraint, Verification
 
 Noise = Callable[[LoopConstraint], gtsam.noiseModel.Base]
@@ -167,7 +167,7 @@ class LoopCloser:
         """
         found: list[Closure] = []
         while self._pending and (wait or self._pending[0].done()):
-            verifications = self._pending.popleft().result()
+            verifications = answer_of(self._pending.popleft())
             found += [self._closure(one) for one in verifications if isinstance(one, LoopConstraint)]
         self._closures += found
         return [closure.factor for closure in found]

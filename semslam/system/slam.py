@@ -19,7 +19,7 @@ from semslam.geometry.se3 import adjoint, invert, orthonormalise
 from semslam.loop.verification.verifier import LoopVerifier
 from semslam.plugins import load
 from semslam.runtime.stopwatch import Stopwatch
-from semslam.runtime.workers import Worker, WorkerKind
+from semslam.runtime.workers import Worker, WorkerKind, answer_of
 from semslam.system.closing import KeyframeAnswer, KeyframeJob, build_closing
 from semslam.system.recovery import recover_poses
 from semslam.system.refinement import refine
@@ -229,7 +229,7 @@ class Slam:
     def _collect(self, leave: int) -> None:
         """Take in the answers for all keyframes but the last ``leave``, waiting for them where they are not there."""
         while len(self._pending) > leave:
-            answer = self._pending.popleft().result()
+            answer = answer_of(self._pending.popleft())
             self._listener(answer)
             self._stopwatch.add(answer.seconds)
             self._outcomes += answer.verifications

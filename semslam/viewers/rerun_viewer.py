@@ -1,7 +1,7 @@
 """A run shown in Rerun (https://rerun.io)."""
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, cast
 
 import cv2
 import numpy as np
@@ -136,7 +136,7 @@ class RerunViewer:
         self._stream.set_time("time", timestamp=timestamp)
 
     def _final(self, name: str, what: object) -> None:
-        self._stream.log(f"{FINAL}/{name}", what, static=True)  # type: ignore[arg-type]
+        self._stream.log(f"{FINAL}/{name}", cast("Any", what), static=True)
 
     def _show_camera(self, camera: Intrinsics) -> None:
         if camera == self._intrinsics:

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from semslam.errors import DatasetError, ModelError
-from semslam.runtime.workers import WorkerKind, make_worker
+from semslam.errors import DatasetError, ModelError, SemslamError
+from semslam.runtime.workers import WorkerKind, answer_of, make_worker
 
 SCRIPT = """
 import os, signal, sys
@@ -63,6 +63,15 @@ def test_a_process_ignores_ctrl_c() -> None:
     _, process = worker.submit(1).result()
     os.kill(process, signal.SIGINT)
     assert worker.submit(1).result()[0] == 2
+    worker.close()
+
+
+def test_a_process_that_is_killed_is_an_error_of_ours() -> None:
+    worker = make_worker(WorkerKind.PROCESS, summing)
+    _, process = worker.submit(1).result()
+    os.kill(process, signal.SIGKILL)
+    with pytest.raises(SemslamError, match="has ended"):
+        answer_of(worker.submit(1))
     worker.close()
 
 
