@@ -100,13 +100,12 @@ class Journal:
         self._past = deque(past.frames if past else ())
         self._known = sum(len(some) for some in past.outcomes.values()) if past else 0
         self._file = path.open("r+b" if past else "wb", buffering=0)
-        self._synced = time.monotonic()
+        self._synced = -SYNC_INTERVAL  # the head is on the disk at once
         if past:
             self._file.truncate(past.length)
             self._file.seek(past.length)
         else:
             self._append(b"H" + json.dumps(asdict(header)).encode())
-            os.fsync(self._file.fileno())
 
     def frame(self, state: FrameState) -> None:
         """Take a frame that was done.
