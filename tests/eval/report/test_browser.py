@@ -65,11 +65,12 @@ def visit(
     opened.page.close()
 
 
+ON_RUNS = pytest.mark.parametrize("visit", [("run", size) for size in SIZES], ids=SIZES, indirect=True)
+
+
 @pytest.fixture
 def run_page(visit: Visit) -> Visit:
     """The page of a run as it is when it has just been opened."""
-    if not visit.page.locator("#filters").count():
-        pytest.skip("a comparison has no table of loops")
     visit.page.evaluate(
         "document.querySelectorAll('dialog').forEach(d => d.close()); const form = document.getElementById('filters');"
         "form.reset(); form.dispatchEvent(new Event('input'))"
@@ -83,6 +84,7 @@ def test_nothing_overflows_or_fails_or_is_fetched(visit: Visit) -> None:
     assert visit.fetched == []
 
 
+@ON_RUNS
 def test_a_click_shows_both_frames_and_all_values(run_page: Visit) -> None:
     page = run_page.page
     assert not page.locator("#loop").is_visible()
@@ -101,6 +103,7 @@ def test_a_click_shows_both_frames_and_all_values(run_page: Visit) -> None:
     assert run_page.complaints == []
 
 
+@ON_RUNS
 def test_rejected_and_withdrawn_candidates_are_shown_too(run_page: Visit) -> None:
     page = run_page.page
     for kind in ("rejected", "withdrawn"):
@@ -112,6 +115,7 @@ def test_rejected_and_withdrawn_candidates_are_shown_too(run_page: Visit) -> Non
         page.keyboard.press("Escape")
 
 
+@ON_RUNS
 def test_the_table_sorts_and_filters(run_page: Visit) -> None:
     page = run_page.page
     rows = page.locator("#loops tbody tr")
@@ -127,6 +131,7 @@ def test_the_table_sorts_and_filters(run_page: Visit) -> None:
     assert (page.locator("#count").text_content() or "").startswith("0 of")
 
 
+@ON_RUNS
 def test_a_click_into_the_timeline_shows_the_candidate(run_page: Visit) -> None:
     page = run_page.page
     page.eval_on_selector("#timeline", "plot => plot.emit('plotly_click', {points: [{customdata: 2}]})")
