@@ -50,3 +50,12 @@ class ResultsError(SemslamError):
 
 class ModelError(SemslamError):
     """Network weights are missing, of another network, or damaged."""
+
+
+def as_our_own(error: Exception) -> SemslamError:
+    """An error of any kind as one clear sentence."""
+    if isinstance(error, SemslamError):
+        return error
+    if isinstance(error, MemoryError):
+        return SemslamError("There is not enough memory.")
+    return SemslamError(f"{type(error).__name__}: {' '.join(str(error).split())}.")

@@ -11,6 +11,7 @@ from semslam.loop.detector import NoLoops
 from semslam.loop.search import LoopSearch
 from semslam.loop.verification.verifier import LoopVerifier
 from semslam.runtime.stopwatch import Stopwatch
+from semslam.runtime.usage import ProcessUsage, usage_now
 from semslam.runtime.workers import Worker, WorkerKind, make_worker
 from semslam.types import FloatArray, Frame, Keyframe, LabelMap, LoopConstraint, Verification
 
@@ -44,6 +45,7 @@ class KeyframeAnswer:
         withdrawn: the same of those that it no longer follows.
         labels: the keyframe's segmentation without confidences, where one was made.
         seconds: time of each call, by stage.
+        usage: of the process in which loops are closed, so far.
     """
 
     keyframe: int
@@ -53,6 +55,7 @@ class KeyframeAnswer:
     withdrawn: tuple[tuple[int, int], ...]
     labels: LabelMap | None
     seconds: Mapping[str, Sequence[float]]
+    usage: ProcessUsage
 
 
 class LoopClosing:
@@ -97,6 +100,7 @@ class LoopClosing:
             withdrawn=change.withdrawn,
             labels=None if self._search.labels is None else replace(self._search.labels, confidence=None),
             seconds=self._stopwatch.take(),
+            usage=usage_now(),
         )
 
 

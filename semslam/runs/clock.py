@@ -1,0 +1,31 @@
+"""Wall time, processor time and peak memory of a run."""
+
+import time
+
+from semslam.runs.metrics import TimeMetrics
+from semslam.runtime.stopwatch import Stopwatch
+from semslam.runtime.usage import ProcessUsage, usage_now
+
+
+class RunClock:
+    """Starts when it is made; a process that worked beside the run counts with all that it has used."""
+
+    def __init__(self) -> None:
+        self._wall, self._start = time.perf_counter(), usage_now()
+        self._beside: ProcessUsage | None = None
+
+    def note(self, usage: ProcessUsage) -> None:
+        """Take in what loop closing has used so far, wherever it runs."""
+        if usage.process != self._start.process:
+            self._beside = usage
+
+    def read(self, frames: int, stopwatch: Stopwatch) -> TimeMetrics:
+        """The times of a run of so many frames."""
+        wall, now, beside = time.perf_counter() - self._wall, usage_now(), self._beside
+        return TimeMetrics(
+            wall_s=round(wall, 3),
+            fps=round(frames / wall, 2),
+            cpu_s=round(now.cpu_s - self._start.cpu_s + (0.0 if beside is None else beside.cpu_s), 3),
+            peak_mb=round(now.peak_mb + (0.0 if beside is None else beside.peak_mb), 1),
+            stages_ms=stopwatch.medians_ms(),
+        )

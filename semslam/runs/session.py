@@ -1,0 +1,211 @@
+"""A run between its first frame and its result."""
+
+import multiprocessing
+from collections.abc import Callable, Iterable, Iterator
+from functools import lru_cache, partial
+
+from semslam.config import Config
+from semslam.datasets.dataset import Dataset
+from semslam.datasets.plausibility import check_plausibility
+from semslam.datasets.prefetch import prefetch
+from semslam.errors import DatasetError, as_our_own
+from semslam.eval.trajectory import coverage_remark
+from semslam.loop.verification.verifier import LoopVerifier
+from semslam.maps.cloud import join_clouds
+from semslam.runs.clock import RunClock
+from semslam.runs.journal import Journal, JournalError
+from semslam.runs.metrics import Metrics
+from semslam.runs.recording import RecordedFrame, Recording, checksum
+from semslam.runs.result import PartialRunError, RunResult
+from semslam.runs.scoring import Scores, score_run
+from semslam.runtime.stopping import Stop
+from semslam.runtime.stopwatch import Stopwatch
+from semslam.runtime.workers import WorkerKind
+from semslam.system.closing import KeyframeAnswer
+from semslam.system.result import FrameState, SlamResult
+from semslam.system.slam import Slam
+from semslam.types import Frame, LoopConstraint, Trajectory
+from semslam.viewers.viewer import FinishedRun, KeyframeScene, LoopScene, NoViewer, ShownLoop, Viewer, aligned_truth
+
+Progress = Callable[[int, FrameState | None], None]
+
+LONG_SEQUENCE = 300
+"""Frames from which on a process of its own for loops is worth its start."""
+
+
+class Session:
+    """A run between its first frame and its result."""
+
+    def __init__(
+        self,
+        dataset: Dataset,
+        config: Config,
+        verifier: LoopVerifier | None = None,
+        viewer: Viewer | None = None,
+        journal: Journal | None = None,
+    ) -> None:
+        self._dataset, self._config, self._journal = dataset, config, journal
+        self._viewer = viewer or NoViewer()
+        self._stopwatch, self._clock = Stopwatch(), RunClock()
+        worker = _worker(config, len(dataset))
+        self._slam = Slam.from_config(config, self._stopwatch, verifier, worker, self._show_answer)
+        self._unreadable: list[str] = []
+        self._checksum = 0
+        self._interrupted = False
+        self._looks = False  # at the sequence; a replay leaves the images alone, which were looked at when recorded
+        self._done = self._tracked = 0
+        self._failure: Exception | None = None
+
+    def track(self) -> Iterator[tuple[int, FrameState | None]]:
+        """Read and track every frame."""
+        self._looks = True
+        for index, item in enumerate(prefetch(self._dataset)):
+            if isinstance(item, DatasetError):
+                self._unreadable.append(str(item))
+                yield index, None
+            else:
+                self._checksum = self._checksum or checksum(item)
+                state = self._slam.process(item)
+                self._show(state, item)
+                yield index, state
+
+    def repeat(self, recording: Recording) -> Iterator[tuple[int, FrameState]]:
+        """Take each frame's motion from a recording."""
+        self._unreadable.extend(recording.unreadable)
+        self._checksum, self._interrupted = recording.checksum, recording.interrupted
+        for frame in recording.frames:
+            read = lru_cache(maxsize=1)(partial(self._dataset.frame, frame.index))
+            state = self._slam.advance(frame.index, frame.timestamp, frame.motion, read)
+            self._show(state, None if state.keyframe is None else read())
+            yield frame.index, state
+
+    def _show(self, state: FrameState, frame: Frame | None) -> None:
+        """Show the viewer a frame; its images are at hand at keyframes at least."""
+        self._viewer.track(frame, state)
+        if state.keyframe is not None and frame is not None:
+            keyframe = self._slam.keyframes[-1]
+            self._viewer.keyframe(KeyframeScene(keyframe, frame, state.motion.observations))
+
+    def _show_answer(self, answer: KeyframeAnswer) -> None:
+        """Show the viewer what became of a keyframe, and note it."""
+        self._clock.note(answer.usage)
+        if self._journal is not None:
+            self._journal.outcomes(answer.verifications)
+        loops = tuple(
+            ShownLoop(v.candidate.query, v.candidate.match, isinstance(v, LoopConstraint)) for v in answer.verifications
+        )
+        self._viewer.loops(LoopScene(self._slam.keyframes[answer.keyframe], answer.labels, loops))
+
+    def close(self) -> None:
+        """End what runs beside tracking."""
+        self._slam.close()
+
+    def drive(self, states: Iterable[tuple[int, FrameState | None]], progress: Progress, stop: Stop) -> None:
+        """Take frame after frame until the last, until asked to stop, or until something goes wrong."""
+        try:
+            with stop.breakable():
+                for index, state in states:
+                    self._done = index + 1
+                    if state is not None:
+                        self._tracked += 1
+                        if self._journal is not None:
+                            self._journal.frame(state)
+                    progress(index, state)
+                    if stop.requested:
+                        self._interrupted |= self._done < len(self._dataset)
+                        break
+        except KeyboardInterrupt:
+            self._interrupted = True
+        except JournalError:
+            raise
+        except Exception as error:  # whatever a dataset, a plug-in or a library may raise: nothing computed is lost
+            if not self._tracked:
+                raise as_our_own(error) from error
+            self._interrupted, self._failure = True, error
+
+    def result(self) -> RunResult:
+        """Optimise, score and join what was found.
+
+        Raises:
+            DatasetError: there is nothing.
+            PartialRunError: the sequence was ended by an error.
+        """
+        if not self._tracked:
+            raise DatasetError((*self._unreadable, f"No frame of {self._dataset.name} could be tracked.")[0])
+        slam = self._finished()
+        error = None if self._failure is None else f"Frame {self._done} ended the run: {as_our_own(self._failure)}"
+        result = self._joined(slam, error)
+        if error is not None:
+            raise PartialRunError(error, result) from self._failure
+        return result
+
+    def _finished(self) -> SlamResult:
+        """The optimised run; where a keyframe's loops could not be closed, without the loops from there on."""
+        try:
+            return self._slam.finish()
+        except Exception as error:  # what a detector, a segmenter or a verifier raised, perhaps in another process
+            self._slam.leave_pending()
+            self._interrupted, self._failure = True, self._failure or error
+        try:
+            return self._slam.finish()
+        except Exception as error:
+            raise as_our_own(error) from error
+
+    def _joined(self, slam: SlamResult, error: str | None) -> RunResult:
+        times = self._clock.read(len(slam.frames), self._stopwatch)
+        unreadable = len(self._unreadable)
+        scores = score_run(self._dataset, self._config, slam, unreadable, times, self._interrupted, error)
+        self._viewer.finish(partial(_shown_at_the_end, slam, scores, self._dataset.ground_truth))
+        return RunResult(
+            config=self._config,
+            slam=slam,
+            odometry=scores.odometry,
+            live=scores.live,
+            trajectory=scores.trajectory,
+            ground_truth=self._dataset.ground_truth,
+            ledger=scores.ledger,
+            metrics=scores.metrics,
+            recording=Recording(
+                tuple(RecordedFrame(state.index, state.timestamp, state.motion) for state in slam.frames),
+                tuple(self._unreadable),
+                self._interrupted,
+                self._checksum,
+            ),
+            notes=(
+                *self._doubts(slam, scores.metrics),
+                *self._dataset.notes,
+                *self._unreadable,
+                *slam.notes,
+                *([] if error is None else [error]),
+                *([] if self._journal is None or self._journal.note is None else [self._journal.note]),
+            ),
+        )
+
+    def _doubts(self, slam: SlamResult, metrics: Metrics) -> list[str]:
+        """What looks wrong with the sequence, and with a score that stands for few of its frames."""
+        found = check_plausibility(self._dataset, [state.index for state in slam.frames]) if self._looks else ()
+        remark = coverage_remark(metrics.optimized.pairs, metrics.frames)
+        return [*(doubt.sentence for doubt in found), *([] if remark is None else [remark])]
+
+
+def _worker(config: Config, frames: int) -> WorkerKind:
+    """Where loops are closed; a process takes seconds to start, which a short sequence does not win back.
+
+    Where runs are made side by side, in processes of their own, each stays in its process.
+    """
+    if config.loops.worker == "auto":
+        is_worth_it = frames >= LONG_SEQUENCE and multiprocessing.parent_process() is None
+        return WorkerKind.PROCESS if is_worth_it else WorkerKind.NONE
+    return WorkerKind(config.loops.worker)
+
+
+def _shown_at_the_end(slam: SlamResult, scores: Scores, ground_truth: Trajectory | None) -> FinishedRun:
+    """What a viewer shows in the end."""
+    keyframes, poses = slam.largest_map, slam.solution.poses
+    return FinishedRun(
+        trajectory=scores.trajectory,
+        ground_truth=aligned_truth(ground_truth, scores.trajectory),
+        keyframes={keyframe.id: poses[keyframe.id] for keyframe in keyframes},
+        ledger=scores.ledger,
+        map=join_clouds(keyframes, poses),
+    )
