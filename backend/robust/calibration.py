@@ -1,4 +1,4 @@
-"""Whether the stated covariances can be believed: loops that agree with one another tell.
+"""Estimates from mutually consistent loops by how much the stated covariances are too small.
 
 A front end that drifts by a bias it does not know of states too small a covariance; every true loop then looks
 false. Where most loops contradict odometry, odometry is what is wrong, and its covariance is widened until a
@@ -15,7 +15,7 @@ from semslam.geometry.se3 import invert
 from semslam.types import FloatArray, IntArray
 
 QUORUM = 5
-"""Fewer loops than this are no evidence against odometry."""
+"""Minimum number of loops that are evidence against odometry."""
 QUARTILE, QUARTILE_CHI2 = 25.0, 3.4546
 """A quarter of true loops lie below this squared Mahalanobis distance (6 degrees of freedom)."""
 MEDIAN, MEDIAN_CHI2 = 50.0, 5.3481
@@ -30,7 +30,7 @@ NEIGHBOURHOOD = 3
 STRETCH = 20
 """Keyframes of odometry that a cycle through two loops may hold on either side."""
 MAX_CYCLES = 2000
-"""Loops, and cycles through two of them, that are looked at; of more, every n-th."""
+"""Maximum number of loops, and of cycles through two of them, that are used; of more, every n-th."""
 
 
 def cycle_scale(chain: OdometryChain, loops: Sequence[Edge], limit: float) -> float:
@@ -78,7 +78,7 @@ def loop_scale(chain: OdometryChain, loops: Sequence[Edge], limit: float) -> flo
 def cycles(
     chain: OdometryChain, loops: Sequence[Edge], first: IntArray, second: IntArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
-    """How far pairs of loops are from closing a cycle with the odometry between their ends.
+    """Closure errors of the cycles through pairs of loops and the odometry between their ends.
 
     Args:
         chain: odometry.
@@ -87,7 +87,7 @@ def cycles(
         second: (P,) index of the other.
 
     Returns:
-        (P, 6) what is left when going round, (P, 6, 6) its covariance from the two loops, (P, 6, 6) from odometry,
+        (P, 6) closure errors, (P, 6, 6) their covariances from the two loops, (P, 6, 6) from odometry,
         and (P,) whether odometry joins both ends.
     """
     T_match_query = np.stack([loop.T_from_to for loop in loops])
