@@ -20,7 +20,7 @@ from semslam.types import (
 )
 
 FITNESS_SLACK = 0.95
-"""Share of the first guess's fitness that ICP's pose must keep: the loss may trade some points for a better fit."""
+"""Share of the initial guess's fitness that ICP's pose must keep: the loss may trade some points for a better fit."""
 ROTATION_GROWTH, TRANSLATION_GROWTH = 0.5, 1.5
 """Powers of the overlap that errors grow with as it falls, fitted to ground truth on two real sequences."""
 MIN_SEEN = 0.05
@@ -28,11 +28,11 @@ MIN_SEEN = 0.05
 
 
 class IcpVerifier:
-    """A first guess from features and one from semantic nodes, ICP, and gates that test what comes out.
+    """Initial guesses from features and from semantic nodes, ICP, and gates that test the result.
 
-    PnP RANSAC on feature matches, and the rigid motion of matched semantic nodes, each say where the query may stand.
-    From there features are matched anew near where they are predicted, also after ICP; the guess that most features
-    agree on is kept. ICP on the keyframes' clouds then refines it, unless its pose fits the clouds worse or moves the
+    PnP RANSAC on feature matches, and the rigid motion of matched semantic nodes, each give an initial guess
+    of the query's pose. From there features are matched anew near where they are predicted, also
+    after ICP; the guess that most features agree on is kept. ICP on the keyframes' clouds then refines it, unless its pose fits the clouds worse or moves the
     agreeing features far, as where a view holds one plane. A constraint needs enough agreeing features, fitness, a
     small residual, overlap seen from both sides, no points in space that the other view looked through, and a
     position that is determined.
@@ -50,7 +50,7 @@ class IcpVerifier:
         return cls(config.verification, config.seed)
 
     def verify(self, query: Keyframe, match: Keyframe, candidate: LoopCandidate) -> LoopConstraint | LoopRejection:
-        """See ``LoopVerifier``; the reason, figure and limit of a rejection are those of the first gate that closed."""
+        """See ``LoopVerifier``; the reason, value and limit of a rejection are those of the first gate that failed."""
         pair = FeaturePair(query, match, self._config.max_reprojection)
         matches = pair.matches(self._config.match_ratio)
         guess, figures = self._best_guess(query, match, candidate, pair, matches)
