@@ -30,12 +30,12 @@ MIN_SEEN = 0.05
 class IcpVerifier:
     """Initial guesses from features and from semantic nodes, ICP, and gates that test the result.
 
-    PnP RANSAC on feature matches, and the rigid motion of matched semantic nodes, each give an initial guess
-    of the query's pose. From there features are matched anew near where they are predicted, also
-    after ICP; the guess that most features agree on is kept. ICP on the keyframes' clouds then refines it, unless its pose fits the clouds worse or moves the
-    agreeing features far, as where a view holds one plane. A constraint needs enough agreeing features, fitness, a
-    small residual, overlap seen from both sides, no points in space that the other view looked through, and a
-    position that is determined.
+    PnP RANSAC on feature matches, and the rigid motion of matched semantic nodes, each give an initial guess of the
+    query's pose. From there features are matched anew near where they are predicted, also after ICP; the guess that
+    most features agree on is kept. ICP on the keyframes' clouds then refines it, unless its pose fits the clouds worse
+    or moves the agreeing features far, as where a view holds one plane. A constraint needs enough agreeing features,
+    fitness, a small residual, overlap seen from both sides, no points in space that the other view looked through, and
+    a position that is determined.
     """
 
     name = "icp"
