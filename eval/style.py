@@ -1,22 +1,27 @@
-"""How pictures look: colours, marks of loops, and drawing into a PNG. Equal pictures are equal bytes.
+"""How pictures look: colours, dashes, markers, sizes and file formats. Equal pictures are equal bytes.
 
-Colours are those of Okabe and Ito, which remain apart for colour-blind readers; loops differ in line or marker too.
+Colours are those of Okabe and Ito, which remain apart for colour-blind readers; whatever differs in colour differs in
+dashes or marker too, so that a print in grey can be read.
 """
 
 import io
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Any
 
 import matplotlib.style
 from matplotlib.figure import Figure
+from matplotlib.font_manager import FontProperties, findfont
 
-TRUTH, ODOMETRY, OPTIMISED = "#b4b4b4", "#cc79a7", "#0072b2"
+from semslam.errors import ConfigError
+from semslam.types import LedgerEntry, LoopJudgement, LoopOutcome
+
+LineStyle = str | tuple[float, tuple[float, ...]]
 DPI = 130
+FONT, FONT_SIZE = "DejaVu Sans", 9.5
 STYLE: dict[str, object] = {
-    "font.family": "DejaVu Sans",
-    "font.size": 9.5,
-    "axes.titlesize": 11,
+    "axes.titlesize": "large",
     "axes.titleweight": "bold",
     "axes.titlelocation": "left",
     "axes.titlepad": 10,
@@ -31,50 +36,156 @@ STYLE: dict[str, object] = {
     "xtick.color": "#555555",
     "ytick.color": "#555555",
     "lines.solid_capstyle": "round",
+    "lines.dash_capstyle": "butt",
     "legend.frameon": False,
-    "legend.fontsize": 9,
+    "legend.fontsize": "medium",
     "figure.facecolor": "white",
     "savefig.facecolor": "white",
+    "pdf.fonttype": 42,
+    "svg.fonttype": "path",
+    "svg.hashsalt": "semslam",
 }
 
 
-class LoopKind(StrEnum):
-    """How a loop is drawn: what truth says of an accepted one, or that it did not get so far."""
+@dataclass(frozen=True, slots=True)
+class Stroke:
+    """Colour, dashes and width (points) of a path."""
 
-    TRUE = "true"
-    INACCURATE = "inaccurate"
-    FALSE = "false"
-    ACCEPTED = "accepted"
-    WITHDRAWN = "withdrawn"
-    REJECTED = "rejected"
+    color: str
+    line: LineStyle
+    width: float
+
+    @property
+    def arguments(self) -> dict[str, Any]:
+        """What matplotlib's plotting functions take."""
+        return {"color": self.color, "linestyle": self.line, "linewidth": self.width}
+
+
+TRUTH = Stroke("#b4b4b4", "-", 3.4)
+ODOMETRY = Stroke("#cc79a7", (0, (4.5, 1.6)), 1.4)
+OPTIMISED = Stroke("#0072b2", "-", 1.7)
+_COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#222222")
+_LINES: tuple[LineStyle, ...] = ("-", (0, (5, 1.8)), (0, (1.2, 1.4)), (0, (6, 1.5, 1.2, 1.5)))
+SERIES = tuple(Stroke(_COLORS[i % len(_COLORS)], _LINES[i % len(_LINES)], 1.7) for i in range(28))
+"""Strokes of things that are compared, in turn: neighbours differ in colour and in dashes."""
 
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """Colour, line style and marker of a kind of loop, and its name in a legend."""
+    """How loops of one kind are drawn.
 
-    color: str
-    line: str
-    marker: str
+    Attributes:
+        name: of the kind, as the ledger has it.
+        label: in a legend.
+        color: as #rrggbb.
+        line: dashes of the link between the two places; empty where the loop is not in the graph.
+        marker: matplotlib's name.
+    """
+
+    name: str
     label: str
+    color: str
+    line: LineStyle
+    marker: str
+
+    @property
+    def is_in_graph(self) -> bool:
+        """Whether the graph follows such loops."""
+        return self.line != ""
 
 
-LOOKS = {
-    LoopKind.TRUE: Look("#009e73", "-", "o", "true loop"),
-    LoopKind.ACCEPTED: Look("#009e73", "-", "o", "accepted loop"),
-    LoopKind.INACCURATE: Look("#e69f00", (0, (4, 1.5)), "s", "inaccurate loop"),  # type: ignore[arg-type]
-    LoopKind.FALSE: Look("#d55e00", "-", "X", "false loop"),
-    LoopKind.WITHDRAWN: Look("#56b4e9", ":", "v", "withdrawn by the graph"),
-    LoopKind.REJECTED: Look("#aaaaaa", "", "o", "rejected by the verification"),
+TRUE = Look("true", "true loop", "#009e73", "-", "o")
+ACCEPTED = Look("accepted", "accepted loop", "#009e73", "-", "o")
+INACCURATE = Look("inaccurate", "inaccurate loop", "#e69f00", (0, (4, 1.5)), "s")
+FALSE = Look("false", "false loop", "#d55e00", "-", "X")
+WITHDRAWN = Look("withdrawn", "withdrawn by the graph", "#56b4e9", "", "v")
+REJECTED = Look("rejected", "rejected by the verification", "#999999", "", "x")
+LOOKS = (TRUE, ACCEPTED, INACCURATE, FALSE, WITHDRAWN, REJECTED)
+OUTCOMES = {LoopOutcome.ACCEPTED: ACCEPTED, LoopOutcome.WITHDRAWN: WITHDRAWN, LoopOutcome.REJECTED: REJECTED}
+"""Looks where nothing is known of the truth."""
+_JUDGED = {
+    LoopJudgement.TRUE: TRUE,
+    LoopJudgement.INACCURATE: INACCURATE,
+    LoopJudgement.FALSE: FALSE,
 }
-IN_GRAPH = (LoopKind.TRUE, LoopKind.ACCEPTED, LoopKind.INACCURATE, LoopKind.FALSE)
 
 
-def render(draw: Callable[[Figure], None], size: tuple[float, float]) -> bytes:
-    """A PNG, ``size`` in inches, in the common style; it carries no date or version, so equal plots are equal bytes."""
-    with matplotlib.style.context(STYLE, after_reset=True):
-        figure = Figure(figsize=size, dpi=DPI, layout="constrained")
+def look_of(entry: LedgerEntry) -> Look:
+    """How a candidate is drawn: by what became of it and, where it was accepted, by what ground truth says of it."""
+    if entry.verdict is LoopOutcome.ACCEPTED and entry.truth is not None:
+        return _JUDGED[entry.truth.judgement]
+    return OUTCOMES[entry.verdict]
+
+
+def by_look(entries: Sequence[LedgerEntry]) -> dict[Look, list[LedgerEntry]]:
+    """The candidates of each kind that there are, in the order of ``LOOKS``."""
+    groups = {look: [entry for entry in entries if look_of(entry) is look] for look in LOOKS}
+    return {look: some for look, some in groups.items() if some}
+
+
+class PictureFormat(StrEnum):
+    """File formats of pictures."""
+
+    PNG = "png"
+    PDF = "pdf"
+    SVG = "svg"
+
+
+@dataclass(frozen=True, slots=True)
+class PictureSettings:
+    """What a caller decides about pictures.
+
+    Attributes:
+        format: of the file.
+        size: width and height in inches; None = as each picture needs it.
+        font: family of the texts.
+        font_size: of the axes' texts, points.
+        title: in place of the picture's own; empty = none.
+    """
+
+    format: PictureFormat = PictureFormat.PNG
+    size: tuple[float, float] | None = None
+    font: str = FONT
+    font_size: float = FONT_SIZE
+    title: str | None = None
+
+    def titled(self, title: str) -> str:
+        """The title to draw where the picture's own is ``title``."""
+        return title if self.title is None else self.title
+
+
+PLAIN = PictureSettings()
+_METADATA: dict[PictureFormat, dict[str, str | None]] = {
+    PictureFormat.PNG: {"Software": None},
+    PictureFormat.PDF: {"CreationDate": None, "Producer": None, "Creator": None},
+    PictureFormat.SVG: {"Date": None, "Creator": None},
+}
+"""Without dates and versions, so that equal pictures are equal bytes."""
+
+
+def render(draw: Callable[[Figure], None], size: tuple[float, float], settings: PictureSettings = PLAIN) -> bytes:
+    """A picture in the common style.
+
+    Args:
+        draw: fills the figure.
+        size: width and height in inches that the picture needs, where the settings name none.
+        settings: format, size and font.
+
+    Raises:
+        ConfigError: the font is not installed.
+    """
+    _check_font(settings.font)
+    fonts = {"font.family": settings.font, "font.size": settings.font_size}
+    with matplotlib.style.context(STYLE | fonts, after_reset=True):
+        figure = Figure(figsize=settings.size or size, dpi=DPI, layout="constrained")
         draw(figure)
         buffer = io.BytesIO()
-        figure.savefig(buffer, format="png", metadata={"Software": None})
+        figure.savefig(buffer, format=settings.format.value, metadata=_METADATA[settings.format])
     return buffer.getvalue()
+
+
+def _check_font(name: str) -> None:
+    try:
+        findfont(FontProperties(family=name), fallback_to_default=False)
+    except ValueError as error:
+        raise ConfigError(f"The font '{name}' is not installed.") from error

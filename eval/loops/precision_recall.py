@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from itertools import cycle
 from typing import Protocol
 
 import numpy as np
@@ -10,13 +11,12 @@ import numpy.typing as npt
 from matplotlib.figure import Figure
 
 from semslam.eval.loops.truth import LoopTruth
-from semslam.eval.style import render
+from semslam.eval.style import PLAIN, SERIES, PictureSettings, render
 from semslam.eval.trajectory import BoolArray
 from semslam.geometry.se3 import FloatArray
 from semslam.types import KeyframeView, LoopCandidate
 
-COLORS = ("#009e73", "#d55e00", "#0072b2", "#222222", "#e69f00", "#cc79a7", "#56b4e9")
-LINES = ("-", "--", ":")
+MARKERS = ("o", "s", "^", "v", "D", "P", "X")
 
 
 class Scorer(Protocol):
@@ -191,22 +191,30 @@ def judge_detector(name: str, answers: DetectorScores, truth: LoopTruth) -> Dete
     )
 
 
-def draw_curves(curves: Mapping[str, Curve], title: str) -> bytes:
-    """Precision over recall of several detectors as PNG, the best average precision first in the legend."""
+def draw_curves(curves: Mapping[str, Curve], title: str, settings: PictureSettings = PLAIN) -> bytes:
+    """Precision over recall of several detectors, the best average precision first in the legend.
+
+    Raises:
+        ConfigError: the font is not installed.
+    """
 
     def draw(figure: Figure) -> None:
         axes = figure.add_subplot()
-        looks = {name: (COLORS[i % len(COLORS)], LINES[i // len(COLORS) % len(LINES)]) for i, name in enumerate(curves)}
+        strokes = dict(zip(curves, cycle(SERIES), strict=False))
+        markers = dict(zip(curves, cycle(MARKERS), strict=False))
         for name, curve in sorted(curves.items(), key=lambda item: -average_precision(item[1])):
             recall = np.concatenate([[0.0], curve.recall])
             precision = np.concatenate([curve.precision[:1], curve.precision])
-            color, line = looks[name]
-            label = f"{name}: {average_precision(curve):.3f}"
-            axes.step(recall, precision, where="pre", color=color, linestyle=line, linewidth=1.8, label=label)
-        axes.set(xlabel="recall", ylabel="precision", title=title, xlim=(-0.01, 1.01), ylim=(0, 1.02))
-        axes.legend(title="average precision", loc="lower left", alignment="left")
+            stroke = strokes[name]
+            axes.step(
+                recall, precision, where="pre", **stroke.arguments,
+                marker=markers[name], ms=5, markevery=0.12, mec="white", mew=0.6,
+                label=f"{name}: {average_precision(curve):.3f}",
+            )  # fmt: skip
+        axes.set(xlabel="recall", ylabel="precision", title=settings.titled(title), xlim=(-0.01, 1.01), ylim=(0, 1.02))
+        figure.legend(title="average precision", loc="outside right upper", alignment="left")
 
-    return render(draw, (7.0, 5.4))
+    return render(draw, (8.4, 5.2), settings)
 
 
 def _matrix(found: list[tuple[int, int, float]], count: int) -> FloatArray:

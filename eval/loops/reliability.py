@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from semslam.eval.loops.truth import LoopTruth
-from semslam.eval.style import OPTIMISED, TRUTH, render
+from semslam.eval.style import OPTIMISED, PLAIN, TRUTH, PictureSettings, render
 from semslam.eval.trajectory import BoolArray
 from semslam.geometry.se3 import FloatArray
 
@@ -49,16 +49,31 @@ def calibration_error(bins: Sequence[ScoreBin]) -> float:
     return sum(part.pairs * abs(part.mean_score - part.share_true) for part in bins) / max(pairs, 1)
 
 
-def draw_reliability(bins: Sequence[ScoreBin], title: str) -> bytes:
-    """Share of true pairs over score as PNG; a calibrated score lies on the diagonal, areas show numbers of pairs."""
+def draw_reliability(bins: Sequence[ScoreBin], title: str, settings: PictureSettings = PLAIN) -> bytes:
+    """Share of true pairs over score, and below it how many pairs have that score; calibrated scores lie on the line.
+
+    Raises:
+        ConfigError: the font is not installed.
+    """
 
     def draw(figure: Figure) -> None:
-        axes = figure.add_subplot()
-        axes.plot([0, 1], [0, 1], color=TRUTH, linewidth=1.2)
+        upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(4, 1.3))
         means, shares = [part.mean_score for part in bins], [part.share_true for part in bins]
-        largest = max((part.pairs for part in bins), default=1)
-        axes.plot(means, shares, color=OPTIMISED, linewidth=1.2)
-        axes.scatter(means, shares, s=[20 + 280 * part.pairs / largest for part in bins], color=OPTIMISED, alpha=0.8)
-        axes.set(xlabel="score", ylabel="share of true pairs", title=title, xlim=(-0.02, 1.02), ylim=(-0.02, 1.02))
+        upper.plot([0, 1], [0, 1], color=TRUTH.color, ls=(0, (2, 2)), lw=1.4, label="calibrated")
+        upper.plot(means, shares, color=OPTIMISED.color, lw=1.6, marker="o", ms=5, label="measured")
+        upper.set(ylabel="share of true pairs", title=settings.titled(title), xlim=(-0.02, 1.02), ylim=(-0.03, 1.03))
+        upper.legend(loc="upper left")
+        lower.bar(
+            [part.low for part in bins], [part.pairs for part in bins], width=0.92 / BINS, align="edge",
+            color=OPTIMISED.color, alpha=0.35,
+        )  # fmt: skip
+        for part in bins:
+            lower.annotate(
+                f"{part.pairs}", ((part.low + part.high) / 2, part.pairs), (0, 2), textcoords="offset points",
+                ha="center", fontsize="small", color="#333333",
+            )  # fmt: skip
+        lower.set(xlabel="score", ylabel="pairs", yscale="log")
+        lower.set_ylim(0.5, 8 * max((part.pairs for part in bins), default=1))
+        lower.grid(visible=False, axis="x")
 
-    return render(draw, (4.6, 4.4))
+    return render(draw, (5.2, 5.6), settings)

@@ -1,109 +1,88 @@
 """Pictures of a run: trajectories, errors and loops over time. The same run gives the same bytes."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
-from semslam.errors import TrajectoryError
-from semslam.eval.style import IN_GRAPH, LOOKS, ODOMETRY, OPTIMISED, TRUTH, LoopKind, render
-from semslam.eval.trajectory import align, position_errors
+from semslam.eval.report.drawing import AXES, RunDrawing, aligned, broken, error_curves, loop_ends, paths, plane
+from semslam.eval.style import FALSE, PLAIN, REJECTED, PictureSettings, by_look, render
 from semslam.geometry.se3 import FloatArray
 from semslam.types import Trajectory
 
-LABELS = "xyz"
-
-
-@dataclass(frozen=True, slots=True)
-class LoopMark:
-    """A loop candidate to be drawn: stamps of its frames in seconds, and what became of it."""
-
-    query_time: float
-    match_time: float
-    kind: LoopKind
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class RunDrawing:
-    """What is drawn of a run.
-
-    Attributes:
-        title: stands above each picture.
-        odometry: the front end's own trajectory.
-        optimised: the final trajectory.
-        truth: ground truth, or None.
-        loops: candidates, in order of query.
-    """
-
-    title: str
-    odometry: Trajectory
-    optimised: Trajectory
-    truth: Trajectory | None
-    loops: tuple[LoopMark, ...] = ()
-
-    @property
-    def start(self) -> float:
-        """Stamp that plots call zero."""
-        return float(min(self.odometry.timestamps[0], self.optimised.timestamps[0]))
-
-    @property
-    def end(self) -> float:
-        """The last stamp of either trajectory."""
-        return float(max(self.odometry.timestamps[-1], self.optimised.timestamps[-1]))
-
-
 Drawer = Callable[[Figure, RunDrawing], None]
+WIDTH = 7.4
+SIDES = (3.2, 8.0)
+"""Least and largest height of the view from above, inches."""
+LEGEND_HEIGHT, TITLE_HEIGHT = 0.6, 0.75
+FADED_FROM = 40
+"""More loops of a kind than these are drawn fainter, so that the path stays visible."""
 
 
-def draw_run(run: RunDrawing) -> dict[str, bytes]:
-    """All pictures of a run as PNG: "trajectory", "loops", "axes" and "error".
+def draw_run(run: RunDrawing, settings: PictureSettings = PLAIN) -> dict[str, bytes]:
+    """All pictures of a run as files: "trajectory", "loops", "axes" and "error".
 
-    Without ground truth "error" shows how far the loops moved each pose instead.
+    Without ground truth "error" shows how far the optimisation moved each pose instead.
 
     Raises:
         TrajectoryError: a trajectory of the run holds no pose.
+        ConfigError: the font is not installed.
     """
-    if not len(run.odometry) or not len(run.optimised):
-        raise TrajectoryError("There is no pose to draw.")
-    aligned = _aligned(run)
+    shown = aligned(replace(run, title=settings.titled(run.title)))
+
+    def picture(drawer: Drawer, size: tuple[float, float]) -> bytes:
+        return render(lambda figure: drawer(figure, shown), size, settings)
+
     return {
-        "trajectory": render(lambda figure: draw_top_view(figure, aligned), (7.6, 6.0)),
-        "loops": render(lambda figure: draw_timeline(figure, aligned), (7.6, 6.0)),
-        "axes": render(lambda figure: draw_axes(figure, aligned), (9.0, 6.0)),
-        "error": render(lambda figure: draw_errors(figure, aligned), (9.0, 6.0)),
+        "trajectory": picture(draw_top_view, view_size([path.trajectory for path in paths(shown)])),
+        "loops": picture(draw_timeline, (6.4, 6.4)),
+        "axes": picture(draw_axes, (9.0, 6.0)),
+        "error": picture(draw_errors, (9.0, 5.0)),
     }
 
 
+def view_size(trajectories: list[Trajectory]) -> tuple[float, float]:
+    """Width and height in inches of a view from above that has no empty sides."""
+    across, up = plane(trajectories)
+    extent = np.ptp(np.concatenate([trajectory.poses[:, :3, 3] for trajectory in trajectories]), axis=0)
+    ratio = float(extent[up] / extent[across]) if extent[across] > 0 else 1.0
+    return WIDTH, float(np.clip(WIDTH * 0.9 * ratio + LEGEND_HEIGHT + TITLE_HEIGHT, *SIDES))
+
+
 def draw_top_view(figure: Figure, run: RunDrawing) -> None:
-    """The paths in the plane of the two axes along which they reach farthest, with the loops in the graph."""
-    reference = run.optimised if run.truth is None else run.truth
-    extent = np.ptp(reference.poses[:, :3, 3], axis=0)
-    across, up = sorted(np.argsort(-extent, kind="stable")[:2])
+    """The paths in the plane in which they reach farthest; loops in the graph lie below them, fainter the more."""
+    across, up = plane([path.trajectory for path in paths(run)])
     axes = figure.add_subplot()
-    for trajectory, color, width, label in _paths(run):
-        x, y = (_broken(trajectory)[1][:, axis] for axis in (across, up))
-        axes.plot(x, y, color=color, linewidth=width, label=label)
-    _loop_links(axes, run, across, up)
+    for order, path in enumerate(paths(run)):
+        x, y = (broken(path.trajectory.timestamps, path.trajectory.poses[:, :3, 3])[1][:, a] for a in (across, up))
+        stroke = path.stroke
+        axes.plot(x, y, **stroke.arguments, label=path.label, zorder=3 + order)
+    _draw_links(axes, run, across, up)
     here = run.optimised.poses[:, :3, 3]
     for index, marker, label in ((0, "o", "start"), (-1, "D", "end")):
-        axes.plot(
-            *here[index, [across, up]], marker, ms=7, mfc="white", mec="#222222", mew=1.5, zorder=6, ls="", label=label
-        )
-    axes.set(xlabel=f"{LABELS[across]} [m]", ylabel=f"{LABELS[up]} [m]", title=run.title, aspect="equal")
+        point = here[index, [across, up]]
+        axes.plot(*point, marker, ms=7, mfc="white", mec="#222222", mew=1.5, zorder=8, ls="", label=label)
+    axes.set(xlabel=f"{AXES[across]} [m]", ylabel=f"{AXES[up]} [m]", title=run.title, aspect="equal")
     axes.set_adjustable("datalim")
-    figure.legend(loc="outside lower center", ncols=4)
+    figure.legend(loc="outside lower center", ncols=3)
 
 
 def draw_axes(figure: Figure, run: RunDrawing) -> None:
     """Position along x, y and z over time."""
     rows = figure.subplots(3, 1, sharex=True)
     for axis, axes in enumerate(rows):
-        for trajectory, color, width, label in _paths(run):
-            stamps, positions = _broken(trajectory)
-            axes.plot(stamps - run.start, positions[:, axis], color=color, linewidth=width, label=label)
-        axes.set_ylabel(f"{LABELS[axis]} [m]")
+        for path in paths(run):
+            stamps, positions = broken(path.trajectory.timestamps, path.trajectory.poses[:, :3, 3])
+            stroke = path.stroke
+            axes.plot(
+                stamps - run.start, positions[:, axis], **stroke.arguments,
+                label=path.label,
+            )  # fmt: skip
+        axes.set_ylabel(f"{AXES[axis]} [m]")
+        axes.margins(x=0.01)
     rows[0].set_title(run.title)
     rows[2].set_xlabel("time [s]")
     figure.align_ylabels(rows)
@@ -111,49 +90,41 @@ def draw_axes(figure: Figure, run: RunDrawing) -> None:
 
 
 def draw_errors(figure: Figure, run: RunDrawing) -> None:
-    """Position error over time before and after the loops; without truth, how far the loops moved each pose."""
-    axes = figure.add_subplot()
-    if run.truth is None:
-        moved = _moved_by_loops(run)
-        stamps, centimetres = _broken_line(moved[0], 100 * moved[1])
-        axes.fill_between(stamps - run.start, centimetres, color=OPTIMISED, alpha=0.15, linewidth=0)
-        axes.plot(stamps - run.start, centimetres, color=OPTIMISED, linewidth=1.6)
-        axes.set_ylabel("correction by the loops [cm]")
-    else:
-        for trajectory, color, label in (
-            (run.odometry, ODOMETRY, "odometry alone"),
-            (run.optimised, OPTIMISED, "optimised"),
-        ):
-            times, errors = position_errors(trajectory, run.truth)
-            rmse = float(np.sqrt(np.mean(errors**2)))
-            stamps, centimetres = _broken_line(times, 100 * errors)
-            axes.plot(
-                stamps - run.start, centimetres, color=color, linewidth=1.6, label=f"{label}: RMSE {100 * rmse:.1f} cm"
-            )
-        axes.set_ylabel("position error [cm]")
-    _loop_ticks(axes, run)
-    axes.set(xlabel="time [s]", title=run.title)
-    axes.set_ylim(bottom=0)
-    handles, labels = axes.get_legend_handles_labels()
-    if handles:
-        figure.legend(handles, labels, loc="outside lower center", ncols=4)
+    """Position error over time before and after optimisation, and below it when loops were found."""
+    rows = [look for look in by_look(run.loops) if look.is_in_graph]
+    upper, *strips = figure.subplots(
+        1 + bool(rows), 1, sharex=True, squeeze=False, height_ratios=(12, 0.8 * len(rows)) if rows else None
+    )[:, 0]
+    for curve in error_curves(run):
+        stroke, centimetres = curve.stroke, 100 * curve.metres
+        upper.plot(
+            curve.stamps - run.start, centimetres, **stroke.arguments,
+            label=curve.label,
+        )  # fmt: skip
+        if run.truth is None:
+            upper.fill_between(curve.stamps - run.start, centimetres, color=stroke.color, alpha=0.15, lw=0)
+    upper.set(ylabel="correction [cm]" if run.truth is None else "position error [cm]", title=run.title)
+    upper.set_ylim(bottom=0)
+    upper.margins(x=0.01)
+    for strip in strips:
+        _draw_strip(strip, run)
+    (strips or [upper])[-1].set_xlabel("time [s]")
+    handles, labels = figure.axes[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=2)
 
 
 def draw_timeline(figure: Figure, run: RunDrawing) -> None:
     """Each candidate at the time of its query (across) and of its match (up)."""
     axes = figure.add_subplot()
     end = max(run.end - run.start, 1.0)
-    axes.plot([0, end], [0, end], color="#bbbbbb", linewidth=1)
-    for kind in reversed(LoopKind):
-        marks = [mark for mark in run.loops if mark.kind is kind]
-        if not marks:
-            continue
-        look = LOOKS[kind]
-        x, y = np.array([(mark.query_time, mark.match_time) for mark in marks]).T - run.start
-        small = kind is LoopKind.REJECTED
+    axes.plot([0, end], [0, end], color="#bbbbbb", lw=1, ls=(0, (2, 2)))
+    groups = by_look(run.loops)
+    for look, loops in reversed(groups.items()):
+        x, y = np.array([(loop.query_time, loop.match_time) for loop in loops]).T - run.start
         axes.scatter(
-            x, y, s=7 if small else 34, marker=look.marker, color=look.color, alpha=0.6 if small else 0.85,
-            linewidths=0, label=f"{look.label} ({len(marks)})",
+            x, y, s=11 if look is REJECTED else 26, marker=look.marker, color=look.color,
+            alpha=0.7 if look is REJECTED else 0.85, linewidths=0.9 if look is REJECTED else 0,
+            label=f"{look.label} ({len(loops)})",
         )  # fmt: skip
     if not run.loops:
         axes.text(0.5, 0.6, "no loop was proposed", transform=axes.transAxes, ha="center", color="#777777")
@@ -161,77 +132,39 @@ def draw_timeline(figure: Figure, run: RunDrawing) -> None:
     axes.set(xlim=(-0.02 * end, 1.02 * end), ylim=(-0.02 * end, 1.02 * end))
     handles, labels = axes.get_legend_handles_labels()
     if handles:
-        axes.legend(handles[::-1], labels[::-1], loc="upper left")
+        axes.legend(handles[::-1], labels[::-1], loc="upper left", frameon=True, framealpha=0.9, edgecolor="none")
 
 
-def _aligned(run: RunDrawing) -> RunDrawing:
-    """The run with its trajectories laid onto the truth, or without a truth that does not meet them."""
-    if run.truth is None:
-        return run
-    try:
-        odometry, optimised = (align(trajectory, run.truth) for trajectory in (run.odometry, run.optimised))
-    except TrajectoryError:
-        return replace(run, truth=None)
-    during = (run.truth.timestamps >= run.start) & (run.truth.timestamps <= run.end)
-    truth = Trajectory(run.truth.timestamps[during], run.truth.poses[during])
-    return replace(run, odometry=odometry, optimised=optimised, truth=truth)
-
-
-def _paths(run: RunDrawing) -> list[tuple[Trajectory, str, float, str]]:
-    """Trajectory, colour, line width and label, those drawn first first."""
-    own = [(run.odometry, ODOMETRY, 1.4, "odometry alone"), (run.optimised, OPTIMISED, 1.8, "optimised")]
-    return own if run.truth is None else [(run.truth, TRUTH, 3.2, "ground truth"), *own]
-
-
-def _broken(trajectory: Trajectory) -> tuple[FloatArray, FloatArray]:
-    """Stamps and positions with a NaN where the trajectory has a hole, so that no line bridges it."""
-    return _broken_line(trajectory.timestamps, trajectory.poses[:, :3, 3])
-
-
-def _broken_line(stamps: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    steps = np.diff(stamps)
-    holes = np.flatnonzero(steps > max(0.5, 5 * float(np.median(steps)) if len(steps) else 0.0)) + 1
-    return np.insert(stamps, holes, np.nan), np.insert(values, holes, np.nan, axis=0)
-
-
-def _loop_links(axes: Axes, run: RunDrawing, across: int, up: int) -> None:
-    stamps, positions = run.optimised.timestamps, run.optimised.poses[:, :3, 3]
-    for kind in IN_GRAPH:
-        marks = [mark for mark in run.loops if mark.kind is kind]
-        if not marks:
+def _draw_links(axes: Axes, run: RunDrawing, across: int, up: int) -> None:
+    for look, loops in by_look(run.loops).items():
+        if not look.is_in_graph:
             continue
-        times = np.array([(mark.query_time, mark.match_time) for mark in marks])
-        ends = positions[np.abs(stamps[:, None, None] - times).argmin(axis=0)]
-        look, wrong = LOOKS[kind], kind is LoopKind.FALSE
-        axes.plot(
-            ends[:, :, across].T, ends[:, :, up].T, color=look.color, linestyle=look.line,
-            linewidth=1.8 if wrong else 1.1, alpha=1.0 if wrong else float(np.clip(40 / len(marks), 0.25, 0.9)),
-            marker=look.marker, ms=4, zorder=5 if wrong else 4,
+        ends: FloatArray = loop_ends(run, loops)[:, :, [across, up]]
+        crowded = len(loops) > FADED_FROM and look is not FALSE
+        alpha = float(np.clip(12 / len(loops), 0.05, 0.3)) if crowded else 0.9
+        width = 0.7 if crowded else 1.8 if look is FALSE else 1.1
+        axes.add_collection(
+            LineCollection(
+                list(ends), colors=look.color, linestyles=[look.line], linewidths=width, alpha=alpha,
+                zorder=6 if look is FALSE else 2.5,
+            )
         )  # fmt: skip
+        size, opacity = (1.8, 0.35) if crowded else (4.0, 0.9)
+        u, v = ends.reshape(-1, 2).T
+        axes.plot(u, v, ls="", marker=look.marker, color=look.color, mew=0, ms=size, alpha=opacity, zorder=2.6)
         axes.plot(
-            [],
-            [],
-            color=look.color,
-            linestyle=look.line,
-            marker=look.marker,
-            ms=5,
-            label=f"{look.label} ({len(marks)})",
+            [], [], color=look.color, ls=look.line, marker=look.marker, ms=5, label=f"{look.label} ({len(loops)})"
         )
 
 
-def _loop_ticks(axes: Axes, run: RunDrawing) -> None:
-    """A tick at the foot of the plot for each loop in the graph, at its query's time."""
-    for kind in IN_GRAPH:
-        times = [mark.query_time - run.start for mark in run.loops if mark.kind is kind]
-        if times:
-            axes.plot(
-                times, np.full(len(times), 0.03), transform=axes.get_xaxis_transform(), ls="", marker="|", ms=9,
-                mew=1.6, color=LOOKS[kind].color, label=f"{LOOKS[kind].label} ({len(times)})",
-            )  # fmt: skip
-
-
-def _moved_by_loops(run: RunDrawing) -> tuple[FloatArray, FloatArray]:
-    """Stamps that both trajectories share, and the distance between their positions in metres."""
-    stamps, before, after = np.intersect1d(run.odometry.timestamps, run.optimised.timestamps, return_indices=True)
-    shift = run.optimised.poses[after, :3, 3] - run.odometry.poses[before, :3, 3]
-    return stamps, np.asarray(np.linalg.norm(shift, axis=1))
+def _draw_strip(axes: Axes, run: RunDrawing) -> None:
+    """A tick for each loop in the graph at its query's time, a row for each kind."""
+    rows = {look: loops for look, loops in by_look(run.loops).items() if look.is_in_graph}
+    for row, (look, loops) in enumerate(rows.items()):
+        times = [loop.query_time - run.start for loop in loops]
+        axes.plot(times, np.full(len(times), row), ls="", marker="|", ms=7, mew=1.0, color=look.color, alpha=0.8)
+    axes.set(yticks=range(len(rows)), yticklabels=[f"{look.name} ({len(loops)})" for look, loops in rows.items()])
+    axes.set_ylim(len(rows) - 0.4, -0.6)
+    axes.tick_params(axis="y", length=0, labelsize="small")
+    axes.grid(visible=False)
+    axes.spines["left"].set_visible(False)

@@ -1,13 +1,11 @@
-"""Tables, progress bars and complaints."""
+"""Tables and complaints."""
 
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
 from rich.text import Text
 
@@ -58,15 +56,12 @@ def remarks(sentences: Sequence[str], most: int = 8) -> None:
         remark(f"... and {len(sentences) - most} more; see log.txt.")
 
 
-@contextmanager
-def bar(title: str, total: int | None, unit: str = "frames") -> Iterator[Callable[[int, int | None], None]]:
-    """Show a progress bar; the function given sets how much is done, and of how much where that is known by now."""
-    columns = (TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn(), TextColumn(unit))
-    with Progress(
-        *columns, TimeElapsedColumn(), TimeRemainingColumn(), console=err, transient=True, disable=not err.is_terminal
-    ) as progress:
-        task = progress.add_task(shown(title), total=total)
-        yield lambda done, whole: progress.update(task, completed=done, total=whole)
+def every_nth(number: int) -> str:
+    """How often, in words: every, every 2nd, every 11th, every 21st."""
+    if number == 1:
+        return "every"
+    ending = {1: "st", 2: "nd", 3: "rd"}.get(number % 10, "th")
+    return f"every {number}{'th' if number % 100 in (11, 12, 13) else ending}"
 
 
 def frame_progress(

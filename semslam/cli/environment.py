@@ -10,8 +10,9 @@ import typer
 
 from semslam.cli import options
 from semslam.cli.command import Command, example
-from semslam.cli.console import bar, out
-from semslam.errors import SemslamError
+from semslam.cli.console import out
+from semslam.cli.progress import bar
+from semslam.errors import ConfigError, SemslamError
 
 PACKAGES = (
     "numpy",
@@ -72,14 +73,29 @@ def doctor_command() -> None:
     out.print("All is well.")
 
 
+def _sequences() -> list[str]:
+    from semslam.datasets.tum_names import short_names
+
+    return short_names()
+
+
 def download_command(
-    name: Annotated[str, typer.Argument(help="A sequence's short name, such as fr1/room.")],
+    name: Annotated[
+        str | None,
+        typer.Argument(help="A short name, such as fr1/room.", autocompletion=options.completer(_sequences)),
+    ] = None,
     directory: Annotated[Path, typer.Argument(help="Folder to unpack it in.")] = Path("data"),
     base_url: Annotated[str | None, typer.Option(help="A mirror to take it from.")] = None,
+    listed: Annotated[bool, typer.Option("--list", help="Print the short names of all sequences.")] = False,
 ) -> None:
     """Fetch a TUM RGB-D sequence; an interrupted download goes on where it stopped."""
     from semslam.datasets.download import BASE_URL, download
 
+    if listed:
+        typer.echo("\n".join(_sequences()))
+        return
+    if name is None:
+        raise ConfigError("Name a sequence, such as fr1/room; --list prints all of them.")
     with bar(name, None, "bytes") as update:
         path = download(name, directory, progress=update, base_url=base_url or BASE_URL)
     out.print(f"Unpacked to {path}", soft_wrap=True)

@@ -9,7 +9,8 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from semslam.cli.command import Command, example
-from semslam.cli.console import bar, out
+from semslam.cli.console import out
+from semslam.cli.progress import bar
 from semslam.errors import ConfigError
 
 if TYPE_CHECKING:

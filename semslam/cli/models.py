@@ -10,7 +10,8 @@ from rich.table import Table
 
 from semslam.cli import options
 from semslam.cli.command import Command, example
-from semslam.cli.console import bar, out
+from semslam.cli.console import out
+from semslam.cli.progress import bar
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

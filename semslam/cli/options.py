@@ -1,11 +1,13 @@
 """Options that several commands share."""
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from semslam import plugins
 from semslam.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -15,9 +17,54 @@ MOST = 2**31 - 1
 RUNS = Path("runs")
 SEQUENCE_HELP = "A sequence: a folder (TUM, 7-Scenes, generic), a .bag or synthetic:..."
 Sequence = Annotated[str, typer.Argument(help=SEQUENCE_HELP)]
-Odometry = Annotated[str | None, typer.Option("--odometry", help="Registered odometry.")]
-Detector = Annotated[str | None, typer.Option("--detector", help="Registered loop detector; 'none' for no loops.")]
-Loader = Annotated[str | None, typer.Option("--loader", help="Dataset loader; guessed from the path by default.")]
+
+
+def completer(known: Callable[[], list[str]]) -> Callable[[str], list[str]]:
+    """Complete a name, or the last one of several joined by commas."""
+
+    def complete(incomplete: str) -> list[str]:
+        before, comma, begun = incomplete.rpartition(",")
+        return [f"{before}{comma}{name}" for name in known() if name.startswith(begun)]
+
+    return complete
+
+
+def _completion(group: plugins.Group) -> Callable[[str], list[str]]:
+    return completer(lambda: plugins.names(group))
+
+
+Odometry = Annotated[
+    str | None,
+    typer.Option(
+        "--odometry",
+        help=f"Odometry: {', '.join(plugins.ODOMETRIES)}, or a plug-in's.",
+        autocompletion=_completion("semslam.odometry"),
+    ),
+]
+Detector = Annotated[
+    str | None,
+    typer.Option(
+        "--detector",
+        help=f"Loop detector: {', '.join(plugins.DETECTORS)}, or a plug-in's; 'none' for no loops.",
+        autocompletion=_completion("semslam.detectors"),
+    ),
+]
+Detectors = Annotated[
+    str,
+    typer.Option(
+        "--detectors",
+        help="Loop detectors joined by commas (see 'semslam run --help').",
+        autocompletion=_completion("semslam.detectors"),
+    ),
+]
+Loader = Annotated[
+    str | None,
+    typer.Option(
+        "--loader",
+        help="Dataset loader; guessed from the path by default.",
+        autocompletion=_completion("semslam.datasets"),
+    ),
+]
 ConfigFile = Annotated[Path | None, typer.Option("--config", help="YAML settings (see 'semslam config').")]
 Settings = Annotated[list[str] | None, typer.Option("--set", help="A setting, section.key=value; may be repeated.")]
 Seed = Annotated[int | None, typer.Option("--seed", min=0, max=2**31 - 1, help="Seed of everything random.")]

@@ -7,7 +7,8 @@ import typer
 
 from semslam.cli import options
 from semslam.cli.command import Command, example
-from semslam.cli.console import bar, frame_progress, metrics_table, out, remark, remarks
+from semslam.cli.console import frame_progress, metrics_table, out, remark, remarks
+from semslam.cli.progress import bar
 from semslam.errors import ConfigError, ResultsError
 
 if TYPE_CHECKING:

@@ -10,7 +10,8 @@ from rich.table import Table
 
 from semslam.cli import options
 from semslam.cli.command import Command, example
-from semslam.cli.console import bar, out, remarks
+from semslam.cli.console import every_nth, out, remarks
+from semslam.cli.progress import bar
 from semslam.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -59,7 +60,7 @@ def eval_command(
 
 def loops_command(
     sequence: options.Sequence,
-    detectors: Annotated[str, typer.Option("--detectors", help="Names joined by commas.")] = "semantic-paper,semantic",
+    detectors: options.Detectors = "semantic-paper,semantic",
     every: Annotated[int, typer.Option(min=1, max=options.MOST, help="Frames from one keyframe to the next.")] = 5,
     out_directory: Annotated[Path, typer.Option("--out", help="Folder for loops.json and the figure.")] = Path("loops"),
     odometry: options.Odometry = None,
@@ -86,14 +87,14 @@ def loops_command(
         out_directory.mkdir(parents=True, exist_ok=True)
     write_json(out_directory / "loops.json", {"detectors": [asdict(quality) for quality in comparison.qualities]})
     with writing(out_directory / "precision_recall.png"):
-        title = f"{dataset.name}, every {every}. frame"
+        title = f"{dataset.name}, {every_nth(every)} frame"
         (out_directory / "precision_recall.png").write_bytes(draw_curves(comparison.curves, title))
     if PROBABILISTIC in names:
         with writing(out_directory / "reliability.png"):
             title = f"{dataset.name}: probability by {PROBABILISTIC}"
             bins = comparison.reliabilities[PROBABILISTIC]
             (out_directory / "reliability.png").write_bytes(draw_reliability(bins, title))
-    table = Table(title=f"{dataset.name}, every {every}. frame a keyframe", title_justify="left")
+    table = Table(title=f"{dataset.name}, {every_nth(every)} frame a keyframe", title_justify="left")
     table.add_column("detector")
     for heading in ("AP", "recall at 100 %", "recall at 99 %", "max F1", "recall@1", "ms"):
         table.add_column(heading, justify="right")

@@ -10,7 +10,8 @@ import typer
 
 from semslam.cli import options
 from semslam.cli.command import Command, example
-from semslam.cli.console import bar, comparison_table, frame_progress, out, remark, text_table
+from semslam.cli.console import comparison_table, frame_progress, out, remark, text_table
+from semslam.cli.progress import bar
 from semslam.errors import ConfigError, ResultsError
 
 if TYPE_CHECKING:
@@ -32,7 +33,7 @@ Jobs = Annotated[int, typer.Option("--jobs", min=1, help="Processes that make ru
 
 def compare_command(
     sequence: options.Sequence,
-    detectors: Annotated[str, typer.Option("--detectors", help="Names joined by commas.")] = DEMO_DETECTORS,
+    detectors: options.Detectors = DEMO_DETECTORS,
     odometry: options.Odometry = None,
     out_directory: Annotated[Path | None, typer.Option("--out", help="Folder of the run folders.")] = None,
     config: options.ConfigFile = None,
@@ -143,7 +144,8 @@ def _compare(
     quiet: bool = False,
 ) -> list["Metrics"]:
     """Run each detector on one odometry; what was found is shown even where a later run fails or is interrupted."""
-    from semslam.runs.results import check_writable, write_json
+    from semslam.runs.comparison import present_comparison
+    from semslam.runs.results import check_writable, write_json, writing
     from semslam.studies.sweep.engine import run_jobs
     from semslam.studies.sweep.plan import comparison_jobs
 
@@ -170,6 +172,9 @@ def _compare(
     failures = [f"{outcome.case.detector}: {outcome.failure}" for outcome in found.values() if outcome.failure]
     if failures:
         raise ResultsError(" ".join(failures))
+    if plots:
+        with writing(directory):
+            present_comparison(directory)
     return metrics()
 
 

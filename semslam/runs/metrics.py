@@ -46,6 +46,7 @@ class Metrics(_Record):
         ground_truth_coverage: share of frames that have ground truth, or None.
         odometry_only: the front end's causal trajectory.
         live: the trajectory as it stood when each frame was done, with the loops known by then.
+        pose_graph: the trajectory after the pose graph with its loops, before the last adjustment.
         optimized: the final trajectory.
         maps: maps left at the end.
         loops: what became of the candidates.
@@ -65,6 +66,7 @@ class Metrics(_Record):
     ground_truth_coverage: float | None
     odometry_only: TrajectoryMetrics
     live: TrajectoryMetrics = TrajectoryMetrics()
+    pose_graph: TrajectoryMetrics = TrajectoryMetrics()
     optimized: TrajectoryMetrics
     maps: int
     loops: LoopMetrics

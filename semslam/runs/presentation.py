@@ -1,130 +1,139 @@
-"""A run's pictures and its report page."""
+"""A saved run's pictures and its report page."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
+from semslam.config import Config
 from semslam.datasets.dataset import Dataset
-from semslam.errors import DatasetError
 from semslam.eval.metrics import ERRORS
-from semslam.eval.report.page import ErrorRow, ReportInput, ReportLoop, loops_to_show, make_report
-from semslam.eval.report.plots import LoopMark, RunDrawing, draw_run
-from semslam.eval.style import LoopKind
+from semslam.eval.report.content import ChangedSetting, ErrorRow, Fact, RunReport, StageTime
+from semslam.eval.report.drawing import RunDrawing
+from semslam.eval.report.frames import embed_images
+from semslam.eval.report.page import make_report
+from semslam.eval.report.plots import draw_run
+from semslam.eval.report.verdict import Outcome, judge_run
+from semslam.eval.style import PLAIN, PictureSettings
+from semslam.runs.inliers import read_inliers
+from semslam.runs.keyframe_images import image_reader
 from semslam.runs.metrics import Metrics
-from semslam.runs.pipeline import RunResult
-from semslam.types import LedgerEntry, LoopOutcome, UInt8Array
-
-FIGURES = ("inliers", "fitness", "inlier_rmse_m", "overlap", "weight")
+from semslam.runs.results import SavedRun
 
 
-def present(result: RunResult, dataset: Dataset, directory: Path) -> None:
-    """Write ``plots/*.png`` and ``report.html``.
+def present(run: SavedRun, dataset: Dataset | None) -> None:
+    """Write ``plots/*.png`` and ``report.html`` into a run folder.
 
     Args:
-        result: the run.
-        dataset: images of the loops that are shown are read again.
-        directory: the run folder.
+        run: the saved run.
+        dataset: the images are read from it again; None = the page goes without.
     """
-    pictures = draw_run(run_drawing(result))
-    (directory / "plots").mkdir()
-    for name, png in pictures.items():
-        (directory / "plots" / f"{name}.png").write_bytes(png)
-    (directory / "report.html").write_text(make_report(report_input(result, dataset, pictures)), encoding="utf-8")
+    write_plots(run, run.directory / "plots")
+    (run.directory / "report.html").write_text(make_report(run_report(run, dataset)), encoding="utf-8")
 
 
-def run_drawing(result: RunResult) -> RunDrawing:
+def write_plots(run: SavedRun, directory: Path, settings: PictureSettings = PLAIN) -> list[Path]:
+    """Write the pictures of a run into a folder and return their paths."""
+    directory.mkdir(parents=True, exist_ok=True)
+    written = []
+    for name, content in draw_run(run_drawing(run), settings).items():
+        written.append(directory / f"{name}.{settings.format.value}")
+        written[-1].write_bytes(content)
+    return written
+
+
+def run_drawing(run: SavedRun) -> RunDrawing:
     """What is drawn of a run."""
+    metrics = run.metrics
     return RunDrawing(
-        title=_title(result.metrics),
-        odometry=result.odometry,
-        optimised=result.trajectory,
-        truth=result.ground_truth,
-        loops=tuple(LoopMark(e.query_time, e.match_time, loop_kind(e)) for e in result.ledger),
+        title=f"{metrics.sequence}: {metrics.odometry} odometry, {metrics.detector} loops",
+        odometry=run.odometry,
+        optimised=run.trajectory,
+        truth=run.ground_truth,
+        loops=run.ledger,
     )
 
 
-def report_input(result: RunResult, dataset: Dataset, pictures: Mapping[str, bytes]) -> ReportInput:
-    """What the report page tells of a run."""
-    kinds = [loop_kind(entry) for entry in result.ledger]
-    shown = set(loops_to_show(kinds))
-    start = result.slam.frames[0].timestamp
-    return ReportInput(
-        title=_title(result.metrics),
-        facts=_facts(result.metrics),
-        errors=_errors(result.metrics),
-        pictures=pictures,
-        loops=tuple(
-            _report_loop(entry, start, _images(entry, dataset) if index in shown else None)
-            for index, entry in enumerate(result.ledger)
-        ),
-        notes=result.notes,
-        settings=result.config.dump(),
+def run_report(run: SavedRun, dataset: Dataset | None) -> RunReport:
+    """Everything on a run's page."""
+    metrics = run.metrics
+    return RunReport(
+        verdict=judge_run(_outcome(metrics), run.ledger),
+        facts=_facts(metrics),
+        errors=_errors(metrics),
+        drawing=run_drawing(run),
+        images=embed_images(run.ledger, image_reader(dataset, run.config)),
+        inliers=read_inliers(run.directory),
+        stages=tuple(StageTime(name, value) for name, value in metrics.time.stages_ms.items()),
+        resources=_resources(metrics),
+        changes=changed_settings(run.config),
+        notes=run.notes,
+        settings=run.config.dump(),
     )
 
 
-def loop_kind(entry: LedgerEntry) -> LoopKind:
-    """How a candidate is drawn."""
-    if entry.verdict is LoopOutcome.ACCEPTED:
-        return LoopKind.ACCEPTED if entry.truth is None else LoopKind(entry.truth.judgement.value)
-    return LoopKind(entry.verdict.value)
+def changed_settings(config: Config) -> tuple[ChangedSetting, ...]:
+    """Settings that differ from their defaults, by dotted name."""
+    defaults = dict(_flat(Config().nested()))
+    return tuple(
+        ChangedSetting(name, _printed(value), _printed(defaults.get(name)))
+        for name, value in _flat(config.nested())
+        if value != defaults.get(name)
+    )
 
 
-def _title(metrics: Metrics) -> str:
-    return f"{metrics.sequence}: {metrics.odometry} odometry, {metrics.detector} loops"
+def _flat(values: Mapping[str, Any], place: str = "") -> Iterator[tuple[str, Any]]:
+    """Nested settings by dotted name."""
+    for key, value in values.items():
+        if isinstance(value, Mapping) and value:
+            yield from _flat(value, f"{place}{key}.")
+        else:
+            yield f"{place}{key}", value
 
 
-def _facts(metrics: Metrics) -> tuple[tuple[str, str], ...]:
+def _outcome(metrics: Metrics) -> Outcome:
+    return Outcome(
+        odometry=metrics.odometry_only.ate_rmse_m,
+        pose_graph=metrics.pose_graph.ate_rmse_m,
+        optimised=metrics.optimized.ate_rmse_m,
+        tracked=metrics.tracked / max(metrics.frames, 1),
+    )
+
+
+def _facts(metrics: Metrics) -> tuple[Fact, ...]:
     loops = metrics.loops
     coverage = metrics.ground_truth_coverage
     return (
-        ("frames", str(metrics.frames)),
-        ("tracked", f"{100 * metrics.tracked / max(metrics.frames, 1):.1f} %"),
-        ("with ground truth", "-" if coverage is None else f"{100 * coverage:.1f} %"),
-        ("keyframes", str(metrics.keyframes)),
-        ("maps", str(metrics.maps)),
-        ("loops proposed", str(loops.proposed)),
-        ("verified", str(loops.verified)),
-        ("accepted", str(loops.accepted)),
-        ("false", "-" if loops.false is None else str(loops.false)),
-        ("frames per second", f"{metrics.time.fps:.1f}"),
+        Fact("frames", str(metrics.frames)),
+        Fact("tracked", f"{100 * metrics.tracked / max(metrics.frames, 1):.1f} %"),
+        Fact("with ground truth", "–" if coverage is None else f"{100 * coverage:.1f} %"),
+        Fact("keyframes", str(metrics.keyframes)),
+        Fact("maps", str(metrics.maps)),
+        Fact("loops proposed", str(loops.proposed)),
+        Fact("verified", str(loops.verified)),
+        Fact("accepted", str(loops.accepted)),
+        Fact("inaccurate", "–" if loops.inaccurate is None else str(loops.inaccurate)),
+        Fact("false", "–" if loops.false is None else str(loops.false)),
+    )
+
+
+def _resources(metrics: Metrics) -> tuple[Fact, ...]:
+    time = metrics.time
+    return (
+        Fact("wall time", f"{time.wall_s:.1f} s"),
+        Fact("processor time", f"{time.cpu_s:.1f} s"),
+        Fact("frames per second", f"{time.fps:.1f}"),
+        Fact("peak memory", f"{time.peak_mb:.0f} MB"),
     )
 
 
 def _errors(metrics: Metrics) -> tuple[ErrorRow, ...]:
     if metrics.optimized.ate_rmse_m is None:
         return ()
+    stages = (metrics.odometry_only, metrics.pose_graph, metrics.optimized)
     return tuple(
-        ErrorRow(error.title, error.unit, getattr(metrics.odometry_only, name), getattr(metrics.optimized, name))
-        for name, error in ERRORS.items()
+        ErrorRow(error.title, error.unit, *(getattr(stage, name) for stage in stages)) for name, error in ERRORS.items()
     )
 
 
-def _report_loop(entry: LedgerEntry, start: float, images: tuple[UInt8Array, UInt8Array] | None) -> ReportLoop:
-    figures = [(name, float(getattr(entry, name))) for name in FIGURES if getattr(entry, name) is not None]
-    if entry.truth is not None:
-        figures += [("error_m", entry.truth.translation_m), ("error_deg", entry.truth.rotation_deg)]
-    if entry.contribution is not None:
-        figures += [("tension", entry.contribution.tension), ("shift_m", entry.contribution.shift_m)]
-        figures += [("ate_gain_m", gain) for gain in (entry.contribution.ate_gain_m,) if gain is not None]
-    reason = entry.reason or ""
-    if entry.figure is not None:
-        reason = f"{reason}: {entry.figure:.3g}, limit {entry.limit:.3g}"
-    return ReportLoop(
-        query=entry.query,
-        match=entry.match,
-        query_time=entry.query_time - start,
-        match_time=entry.match_time - start,
-        score=entry.score,
-        kind=loop_kind(entry),
-        reason=reason,
-        figures=(*entry.evidence.figures.items(), *figures),
-        labels=entry.evidence.labels,
-        nodes=entry.evidence.nodes,
-        images=images,
-    )
-
-
-def _images(entry: LedgerEntry, dataset: Dataset) -> tuple[UInt8Array, UInt8Array] | None:
-    try:
-        return dataset.frame(entry.query_frame).color, dataset.frame(entry.match_frame).color
-    except DatasetError:  # the file has gone since it was read; the report does without
-        return None
+def _printed(value: object) -> str:
+    return "–" if value is None else str(value)

@@ -21,9 +21,9 @@ from semslam.datasets.dataset import Dataset
 from semslam.datasets.tum_format import read_trajectory, write_trajectory
 from semslam.errors import ResultsError
 from semslam.maps.cloud import write_map
+from semslam.runs.inliers import write_inliers
 from semslam.runs.metrics import Metrics
 from semslam.runs.pipeline import RunResult
-from semslam.runs.presentation import present
 from semslam.runs.recording import write_recording
 from semslam.types import Keyframe, LedgerEntry, Trajectory
 
@@ -42,6 +42,7 @@ class SavedRun:
         metrics: all figures.
         keyframe_stamps: seconds by keyframe id, of all maps.
         ground_truth: the dataset's, or None.
+        notes: what was repaired or left out, a sentence each.
     """
 
     directory: Path
@@ -53,6 +54,7 @@ class SavedRun:
     metrics: Metrics
     keyframe_stamps: dict[int, float]
     ground_truth: Trajectory | None
+    notes: tuple[str, ...] = ()
 
 
 def new_run_directory(root: Path, sequence: str, detector: str) -> Path:
@@ -95,8 +97,12 @@ def write_run(
         write_g2o(work / "graph.g2o", result.slam.solution)
         write_map(work / "map.ply", result.slam.largest_map, result.slam.solution.poses)
         write_recording(work, result.recording, source)
+        write_inliers(work, result.slam.outcomes, result.slam.keyframes)
         if plots:
-            present(result, dataset, work)
+            # Drawn from the folder, so that `semslam report` can draw the same again; it reads saved runs as well.
+            from semslam.runs.presentation import present
+
+            present(read_run(work), dataset)
 
 
 def check_writable(directory: Path) -> None:
@@ -145,6 +151,7 @@ def read_run(directory: Path) -> SavedRun:
         metrics=metrics,
         keyframe_stamps=_read_keyframe_table(directory / "keyframes.csv"),
         ground_truth=read_trajectory(truth_file)[0] if truth_file.exists() else None,
+        notes=_read_notes(directory / "log.txt"),
     )
 
 
@@ -246,6 +253,14 @@ def _read_keyframe_table(path: Path) -> dict[int, float]:
             return {int(row["id"]): float(row["timestamp"]) for row in csv.DictReader(file)}
     except (OSError, KeyError, TypeError, ValueError) as error:
         raise ResultsError(f"The list of keyframes {path} cannot be read.") from error
+
+
+def _read_notes(path: Path) -> tuple[str, ...]:
+    """The remarks of a run; none where they cannot be read, for no number depends on them."""
+    try:
+        return tuple(path.read_text(encoding="utf-8").splitlines())
+    except (OSError, UnicodeDecodeError):
+        return ()
 
 
 def _keyframe_trajectory(result: RunResult) -> Trajectory:

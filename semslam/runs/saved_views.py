@@ -6,7 +6,7 @@ from pathlib import Path
 
 from semslam.datasets import open_dataset
 from semslam.datasets.dataset import Dataset
-from semslam.errors import ResultsError
+from semslam.errors import DatasetError, ResultsError
 from semslam.maps.views import PosedView
 from semslam.runs.recording import Recording, read_front_end
 from semslam.runs.results import SavedRun, read_run
@@ -68,6 +68,31 @@ class SavedViews:
         for done, keyframe in enumerate(self.keyframes, start=1):
             yield PosedView(keyframe.id, self.dataset.frame(keyframe.frame), keyframe.T_world_cam)
             progress(done, len(self.keyframes))
+
+
+def find_images(directory: Path, sequence: str | None = None) -> tuple[Dataset | None, str | None]:
+    """The sequence that a saved run ran on, or None and why it cannot be had.
+
+    Args:
+        directory: the run folder.
+        sequence: where the images are now; None = where they were.
+
+    Raises:
+        ResultsError: it is no run folder, or it is damaged.
+        DatasetError: the images that ``sequence`` names cannot be had.
+    """
+    saved = read_front_end(directory)
+    source = sequence or saved.source
+    if source is None:
+        return None, f"{directory} does not say where they are."
+    try:
+        dataset = open_dataset(source, config=saved.config.dataset)
+        saved.recording.check(dataset)
+    except DatasetError as error:
+        if sequence is not None:
+            raise
+        return None, str(error)
+    return dataset, None
 
 
 def open_saved(directory: Path, sequence: str | None = None) -> SavedViews:

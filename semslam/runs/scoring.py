@@ -51,7 +51,7 @@ def score_run(
 ) -> Scores:
     """Score a run; without ground truth, or where it meets fewer than three poses, the errors are None."""
     truth = dataset.ground_truth
-    odometry, live, trajectory = _trajectories(slam)
+    odometry, live, pose_graph, trajectory = _trajectories(slam)
     ledger = _ledger(dataset, slam, config)
     stamps = [state.timestamp for state in slam.frames]
     metrics = Metrics(
@@ -67,6 +67,7 @@ def score_run(
         ground_truth_coverage=None if truth is None else coverage(stamps, truth),
         odometry_only=_score(odometry, truth),
         live=_score(live, truth),
+        pose_graph=_score(pose_graph, truth),
         optimized=_score(trajectory, truth),
         maps=len(slam.solution.components),
         loops=_loop_metrics(slam, ledger, truth is not None),
@@ -90,8 +91,8 @@ def lost_intervals(frames: Sequence[FrameState]) -> list[tuple[float, float]]:
     return intervals
 
 
-def _trajectories(slam: SlamResult) -> tuple[Trajectory, Trajectory, Trajectory]:
-    """Causal, live and final."""
+def _trajectories(slam: SlamResult) -> tuple[Trajectory, Trajectory, Trajectory, Trajectory]:
+    """Causal, live, that of the pose graph and the final one."""
     tracked = np.array([state.status is not TrackingStatus.LOST for state in slam.frames])
     stamps = np.array([state.timestamp for state in slam.frames])
     map_ids = np.array([state.map_id for state in slam.frames])
@@ -103,6 +104,7 @@ def _trajectories(slam: SlamResult) -> tuple[Trajectory, Trajectory, Trajectory]
     return (
         Trajectory(stamps[in_odometry], causal[in_odometry]),
         Trajectory(stamps[in_odometry], live[in_odometry]),
+        Trajectory(stamps[in_final], slam.graph_poses[in_final]),
         Trajectory(stamps[in_final], slam.poses[in_final]),
     )
 

@@ -47,6 +47,7 @@ class SlamResult:
         candidates: what the detector proposed, in order.
         outcomes: what the verification made of each candidate.
         solution: optimised keyframe poses and a verdict for each verified loop.
+        graph_poses: (N, 4, 4) T_world_cam of every frame after the pose graph, before the adjustment.
         poses: (N, 4, 4) optimised T_world_cam of every frame.
         components: for each frame the map it ends in, 0 the largest; maps that a loop joined share a number.
         live_loops: match and query of the loops that the live graph follows at the end.
@@ -57,6 +58,7 @@ class SlamResult:
     keyframes: tuple[Keyframe, ...]
     outcomes: tuple[Verification, ...]
     solution: GraphSolution
+    graph_poses: FloatArray
     poses: FloatArray
     components: tuple[int, ...]
     live_loops: frozenset[tuple[int, int]] = frozenset()

@@ -167,6 +167,7 @@ class Slam:
         self._collect(leave=0)
         with self._stopwatch.stage("optimize"):
             solution = self._graph.optimize()
+        graph_poses = self._recover(solution)
         notes = []
         with self._stopwatch.stage("bundle"):
             try:
@@ -180,13 +181,8 @@ class Slam:
             keyframes=tuple(self._keyframes),
             outcomes=tuple(self._outcomes),
             solution=solution,
-            poses=recover_poses(
-                np.array([state.timestamp for state in self._frames]),
-                np.array([state.T_odom_cam for state in self._frames]).reshape(-1, 4, 4),
-                np.array([state.map_id for state in self._frames], dtype=np.int64),
-                self._keyframes,
-                solution.poses,
-            ),
+            graph_poses=graph_poses,
+            poses=self._recover(solution),
             components=tuple(components.get(state.map_id, unplaced) for state in self._frames),
             live_loops=frozenset(self._live_loops),
             notes=tuple(notes),
@@ -246,6 +242,16 @@ class Slam:
         pose = self._builder.pose
         T_world_odom = self._T_world_odom.get(pose.map_id)
         return pose.T_odom_cam if T_world_odom is None else orthonormalise(T_world_odom @ pose.T_odom_cam)
+
+    def _recover(self, solution: GraphSolution) -> FloatArray:
+        """(N, 4, 4) T_world_cam of every frame, by its keyframes' poses in a solution."""
+        return recover_poses(
+            np.array([state.timestamp for state in self._frames]),
+            np.array([state.T_odom_cam for state in self._frames]).reshape(-1, 4, 4),
+            np.array([state.map_id for state in self._frames], dtype=np.int64),
+            self._keyframes,
+            solution.poses,
+        )
 
     def _components(self, solution: GraphSolution) -> dict[int, int]:
         """For each map of the odometry the place of its component in ``solution.components``, the largest first."""

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import cv2
 import numpy as np
 
-from semslam.eval.style import LOOKS, ODOMETRY, OPTIMISED, TRUTH, LoopKind
+from semslam.eval.style import ACCEPTED, ODOMETRY, OPTIMISED, OUTCOMES, REJECTED, TRUTH
 from semslam.geometry.se3 import transform_points
 from semslam.loop.detectors.semantic.nodes import extract_nodes
 from semslam.loop.detectors.semantic.settings import NodeConfig
@@ -66,8 +66,8 @@ class RerunViewer:
         last, self._last = self._last, state
         if last is not None and last.map_id == state.map_id:
             for name, color, before, now in (
-                ("odometry", ODOMETRY, last.T_odom_cam, state.T_odom_cam),
-                ("path", OPTIMISED, last.T_world_cam, T),
+                ("odometry", ODOMETRY.color, last.T_odom_cam, state.T_odom_cam),
+                ("path", OPTIMISED.color, last.T_world_cam, T),
             ):
                 step = np.stack([before[:3, 3], now[:3, 3]])
                 self._stream.log(f"{LIVE}/{name}", rr.LineStrips3D([step], colors=_rgb(color)))
@@ -114,11 +114,13 @@ class RerunViewer:
     def _show_final(self, finished: FinishedRun) -> None:
         import rerun as rr
 
-        self._final("trajectory", rr.LineStrips3D([finished.trajectory.poses[:, :3, 3]], colors=_rgb(OPTIMISED)))
+        self._final("trajectory", rr.LineStrips3D([finished.trajectory.poses[:, :3, 3]], colors=_rgb(OPTIMISED.color)))
         if finished.ground_truth is not None:
-            self._final("ground_truth", rr.LineStrips3D([finished.ground_truth.poses[:, :3, 3]], colors=_rgb(TRUTH)))
+            self._final(
+                "ground_truth", rr.LineStrips3D([finished.ground_truth.poses[:, :3, 3]], colors=_rgb(TRUTH.color))
+            )
         places = {key: T[:3, 3] for key, T in finished.keyframes.items()}
-        self._final("keyframes", rr.Points3D(list(places.values()), colors=_rgb(OPTIMISED), radii=0.02))
+        self._final("keyframes", rr.Points3D(list(places.values()), colors=_rgb(OPTIMISED.color), radii=0.02))
         self._final("map", rr.Points3D(finished.map.points, colors=finished.map.colors, radii=rr.Radius.ui_points(1.5)))
         for outcome in LoopOutcome:
             self._final(f"loops/{outcome.value}", _lines(finished.ledger, outcome, places))
@@ -182,11 +184,11 @@ class RerunViewer:
     def _show_loops(self, loops: Sequence[ShownLoop]) -> None:
         import rerun as rr
 
-        for name, kind, verified in (("verified", LoopKind.ACCEPTED, True), ("rejected", LoopKind.REJECTED, False)):
+        for name, look, verified in (("verified", ACCEPTED, True), ("rejected", REJECTED, False)):
             kept = [loop for loop in loops if loop.verified is verified]
             if kept:
                 strips = np.array([[self._poses[key][:3, 3] for key in (loop.match, loop.query)] for loop in kept])
-                self._stream.log(f"{LIVE}/loops/{name}", rr.LineStrips3D(strips, colors=_rgb(LOOKS[kind].color)))
+                self._stream.log(f"{LIVE}/loops/{name}", rr.LineStrips3D(strips, colors=_rgb(look.color)))
             self._stream.log(f"{TRACKING}/loops_{name}", rr.Scalars(len(kept)))
 
 
@@ -197,7 +199,7 @@ def _lines(ledger: Sequence[LedgerEntry], outcome: LoopOutcome, places: dict[int
     entries = [e for e in ledger if e.verdict is outcome and e.query in places and e.match in places]
     strips = [np.stack([places[e.match], places[e.query]]) for e in entries]
     labels = [f"{e.match} - {e.query}: {e.reason or e.detector} {e.score:.2f}" for e in entries]
-    color = _rgb(LOOKS[LoopKind(outcome.value)].color)
+    color = _rgb(OUTCOMES[outcome].color)
     return rr.LineStrips3D(strips, colors=color, labels=labels, show_labels=False)
 
 

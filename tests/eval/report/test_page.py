@@ -1,105 +1,124 @@
-"""The report: self-contained, escaped, capped, and honest without truth."""
+"""The pages: self-contained, escaped, complete, and honest without truth."""
 
-import re
+import json
+from dataclasses import replace
 from html.parser import HTMLParser
 
-import numpy as np
 import pytest
 
-from semslam.eval.report.page import ErrorRow, ReportInput, ReportLoop, draw_pair, loops_to_show, make_report
-from semslam.eval.style import LoopKind
-from semslam.types import NodePair
-
-IMAGE = np.tile(np.arange(64, dtype=np.uint8)[None, :, None], (48, 1, 3))
-LOOP = ReportLoop(
-    40, 3, 12.0, 1.0, 0.9, LoopKind.TRUE, figures=(("inliers", 88.0), ("rotation <deg>", 1.25)), labels=("chair",),
-    nodes=(NodePair("chair", (10, 10, 2), (30, 20, 2)),), images=(IMAGE, IMAGE),
-)  # fmt: skip
-REFUSED = ReportLoop(41, 4, 12.5, 1.5, 0.7, LoopKind.REJECTED, reason="few inliers: 12 < 20")
-REPORT = ReportInput(
-    title="kitchen & <b>hall</b>",
-    facts=(("frames tracked", "999 of 1000"),),
-    errors=(ErrorRow("ATE", "m", 0.4, 0.1), ErrorRow("RPE", "m", None, None)),
-    pictures={"trajectory": b"\x89PNG"},
-    loops=(LOOP, REFUSED),
-    notes=("a <note>",),
-    settings="seed: 0 # <script>",
-)
+from semslam.errors import TrajectoryError
+from semslam.eval.report.content import ErrorRow
+from semslam.eval.report.page import make_comparison, make_report
+from tests.eval.report.ledgers import ALL_KINDS
+from tests.eval.report.samples import COMPARISON, EMPTY, REPORT, RUN, circle
 
 
-class Balance(HTMLParser):
-    """Collects tags that are opened and closed."""
+class Collector(HTMLParser):
+    """Collects tags that are opened and closed, what they link to and the data of scripts."""
 
     def __init__(self) -> None:
         super().__init__()
         self.opened: list[str] = []
         self.closed: list[str] = []
         self.sources: list[str] = []
+        self.data = ""
+        self._in_data = False
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         self.opened.append(tag)
-        self.sources += [value or "" for name, value in attrs if name in ("src", "href")]
+        self.sources += [value or "" for name, value in attrs if name in ("src", "href", "data")]
+        self._in_data = ("type", "application/json") in attrs
 
     def handle_endtag(self, tag: str) -> None:
         self.closed.append(tag)
+        self._in_data = False
+
+    def handle_data(self, data: str) -> None:
+        if self._in_data:
+            self.data += data
 
 
-def parsed(page: str) -> Balance:
-    parser = Balance()
+def parsed(page: str) -> Collector:
+    parser = Collector()
     parser.feed(page)
     return parser
 
 
-def test_the_page_carries_everything_and_links_nowhere() -> None:
-    page = make_report(REPORT)
+@pytest.mark.parametrize("page", [make_report(REPORT), make_comparison(COMPARISON)])
+def test_a_page_carries_everything_and_links_nowhere(page: str) -> None:
     tags = parsed(page)
-    assert tags.sources
-    assert all(source.startswith("data:image/") for source in tags.sources)
-    assert not re.search(r"https?://|@import|url\(", page)
-    assert "script" not in tags.opened
-    for tag in ("div", "table", "figure", "details", "main", "span"):
+    assert all(source.startswith("data:") or "://" not in source for source in tags.sources)
+    assert "default-src 'none'" in page
+    for tag in ("div", "table", "figure", "details", "main", "span", "section", "script", "dl"):
         assert tags.opened.count(tag) == tags.closed.count(tag), tag
+    assert len(page) < 5_000_000
 
 
 def test_texts_are_escaped() -> None:
     page = make_report(REPORT)
     assert "kitchen &amp; &lt;b&gt;hall&lt;/b&gt;" in page
-    for raw in ("<note>", "<script>", "<deg>"):
+    for raw in ("<note>", "<x-setting>", "chair <1>"):
         assert raw not in page
+    assert json.loads(parsed(page).data)["candidates"][0]["nodes"] == [["chair <1>", 10, 10, 30, 21]]
 
 
-def test_errors_loops_and_reasons_are_told() -> None:
+def test_what_is_due_to_loops_and_to_the_adjustment_stands_apart() -> None:
     page = make_report(REPORT)
-    assert "0.1000 m" in page
-    assert "-75.0 %" in page
-    assert "few inliers: 12 &lt; 20" in page
-    assert "40 → 3" in page
-    assert "1 of 1 shown" in page
+    assert "by the loops" in page
+    assert "-80.0 %" in page
+    assert "-50.0 %" in page
+    unknown = make_report(replace(REPORT, errors=(ErrorRow("ATE", "m", 0.4, None, 0.1),)))
+    assert "by the loops" not in unknown
+    assert "did not record" in unknown
+    assert "-75.0 %" in unknown
+
+
+def test_every_candidate_is_there_with_all_its_values() -> None:
+    data = json.loads(parsed(make_report(REPORT)).data)
+    assert [kind["name"] for kind in data["kinds"]] == [
+        "true", "accepted", "inaccurate", "false", "withdrawn", "rejected",
+    ]  # fmt: skip
+    assert len(data["candidates"]) == len(ALL_KINDS)
+    rejected, withdrawn, true = data["candidates"][-1], data["candidates"][-2], data["candidates"][0]
+    assert rejected["reason"] == "few inliers: 12, limit 20"
+    assert withdrawn["reason"] == "outlier in the graph: 9.1, limit 4.7"
+    groups = {title: dict(values) for title, values in true["groups"]}
+    assert groups["Proposal"]["rotation"] == "1.25"
+    assert groups["Verification"]["inliers"] == "88"
+    assert groups["Pose graph"]["ATE without it"] == "+0.20 mm"
+    assert groups["Ground truth"]["error of the relative pose"] == "3.0 cm, 0.40°"
+    assert true["matches"] == [[1, 2, 3, 4]]
+
+
+def test_settings_stages_notes_and_origin_are_shown() -> None:
+    page = make_report(REPORT)
+    for text in ("loops.follow", "12.3 ms", "a &lt;note&gt;", "semslam run kitchen", "It works.", "700 MB"):
+        assert text in page
+    assert "All settings are at their defaults" in make_report(replace(REPORT, changes=()))
 
 
 def test_without_truth_and_without_loops() -> None:
-    page = make_report(ReportInput("empty", (), (ErrorRow("ATE", "m", None, None),), {}, ()))
-    assert "no ground truth" in page
+    page = make_report(replace(REPORT, drawing=replace(RUN, truth=None, loops=()), errors=()))
+    assert "There is no ground truth" in page
     assert "No loop was proposed" in page
+
+
+def test_a_run_without_poses_is_one_sentence() -> None:
+    with pytest.raises(TrajectoryError, match="no pose"):
+        make_report(replace(REPORT, drawing=replace(RUN, optimised=EMPTY)))
+
+
+def test_long_trajectories_are_thinned() -> None:
+    long = circle(count=90_000)
+    data = json.loads(parsed(make_report(replace(REPORT, drawing=replace(RUN, optimised=long)))).data)
+    assert max(len(line["x"]) for line in data["view"]["lines"]) <= 4000
 
 
 def test_the_same_input_gives_the_same_page() -> None:
     assert make_report(REPORT) == make_report(REPORT)
 
 
-def test_doubtful_loops_are_shown_first_and_the_rest_spread() -> None:
-    kinds = [LoopKind.TRUE] * 50 + [LoopKind.FALSE, LoopKind.REJECTED, LoopKind.INACCURATE]
-    shown = loops_to_show(kinds, 5)
-    assert {50, 52} <= set(shown)
-    assert len(shown) == 5
-    assert 0 in shown
-    assert 49 in shown
-    assert loops_to_show([LoopKind.REJECTED] * 3) == []
-    assert loops_to_show([LoopKind.FALSE] * 9, 4) == [0, 1, 2, 3]
-
-
-def test_pair_picture_joins_both_frames() -> None:
-    picture = draw_pair(LOOP, width=100)
-    assert picture.shape == (75, 204, 3)
-    with pytest.raises(ValueError, match="no images"):
-        draw_pair(REFUSED)
+def test_a_comparison_links_its_runs_pages() -> None:
+    tags = parsed(make_comparison(COMPARISON))
+    assert "semantic/report.html" in tags.sources
+    assert len(json.loads(tags.data)["errors"]) == 2

@@ -141,10 +141,13 @@ def test_soft_cross_entropy_of_labels_is_the_weighted_one():
     [
         (lambda d: (d / "train.txt").unlink(), "no list"),
         (lambda d: (d / "train.txt").write_text(""), "empty"),
-        (lambda d: (d / "rgb" / "1.png").unlink(), "missing"),
-        (lambda d: (d / "labels40" / "1.png").write_bytes(b"torn"), "missing or not"),
+        (lambda d: (d / "rgb" / "1.png").unlink(), "cannot be read"),
+        (lambda d: (d / "labels40" / "1.png").write_bytes(b"torn"), "damaged or no image"),
         (lambda d: cv2.imwrite(str(d / "labels40" / "1.png"), np.zeros((5, 5), np.uint8)), "another size"),
-        (lambda d: cv2.imwrite(str(d / "labels40" / "1.png"), np.full((96, 128), 41, np.uint8)), "beyond 40"),
+        (
+            lambda d: cv2.imwrite(str(d / "labels40" / "1.png"), np.full((96, 128), 41, np.uint8)),
+            "beyond the 41 classes",
+        ),
     ],
 )
 def test_faulty_folder_is_one_sentence(rooms, tmp_path, damage, word):

@@ -111,8 +111,11 @@ def test_runs_are_made_again_where_the_settings_changed(
     assert contents(out) == contents(finished)
 
 
-def test_a_cluster_gives_the_same_values(suite: Path, finished: Path, tmp_path: Path) -> None:
+def test_a_cluster_gives_the_same_values(
+    suite: Path, finished: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     distributed = pytest.importorskip("distributed")
+    monkeypatch.setenv("PYTHONPATH", str(ROOT))  # the workers are to import this checkout
     with distributed.LocalCluster(
         n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, host="127.0.0.1"
     ) as cluster:

@@ -1,0 +1,49 @@
+"""A run and a comparison with something of everything, for tests of pictures and pages."""
+
+import numpy as np
+
+from semslam.eval.report.content import ChangedSetting, ErrorRow, Fact, RunReport, StageTime
+from semslam.eval.report.drawing import RunDrawing
+from semslam.eval.report.frames import KeyframeImage, LabelColor, embed_images
+from semslam.eval.report.overlay import NamedTrajectory
+from semslam.eval.report.page import ComparedRun, ComparisonReport
+from semslam.eval.report.verdict import Tone, Verdict
+from semslam.types import Trajectory
+from tests.eval.report.ledgers import ALL_KINDS
+
+
+def circle(offset: float = 0.0, count: int = 90) -> Trajectory:
+    """A ring of poses over 18 s that opens by ``offset``."""
+    angle = np.linspace(0, 2 * np.pi, count)
+    poses = np.tile(np.eye(4), (count, 1, 1))
+    poses[:, 0, 3], poses[:, 2, 3] = np.cos(angle) + offset * angle, np.sin(angle)
+    return Trajectory(10 + np.linspace(0, 17.8, count), poses)
+
+
+EMPTY = Trajectory(np.empty(0), np.empty((0, 4, 4)))
+RUN = RunDrawing("kitchen & <b>hall</b>", circle(0.05), circle(0.01), circle(), ALL_KINDS)
+IMAGE = np.tile(np.arange(64, dtype=np.uint8)[None, :, None], (48, 1, 3))
+REPORT = RunReport(
+    verdict=Verdict("It works.", Tone.GOOD),
+    facts=(Fact("frames tracked", "999 of 1000"),),
+    errors=(ErrorRow("ATE", "m", 0.4, 0.08, 0.04), ErrorRow("RPE", "m", None, None, None)),
+    drawing=RUN,
+    images=embed_images(
+        ALL_KINDS, lambda frame: KeyframeImage(IMAGE, IMAGE // 64, (LabelColor("wall", "#ff0000", 0.5),))
+    ),
+    inliers={0: np.array([[1.0, 2.0, 3.0, 4.0]])},
+    stages=(StageTime("odometry", 12.34),),
+    resources=(Fact("peak memory", "700 MB"),),
+    changes=(ChangedSetting("loops.follow", "0", "3"),),
+    origin=(Fact("command", "semslam run kitchen"),),
+    notes=("a <note>",),
+    settings="seed: 0 # <x-setting>",
+)
+COMPARISON = ComparisonReport(
+    title="kitchen: 2 runs compared",
+    verdict=Verdict("semantic is best.", Tone.GOOD),
+    headings=("ATE, cm",),
+    runs=(ComparedRun("none", ("28.0",)), ComparedRun("semantic", ("4.0",), "semantic/report.html")),
+    trajectories=(NamedTrajectory("none", circle(0.05)), NamedTrajectory("semantic", circle(0.01))),
+    truth=circle(),
+)
