@@ -125,8 +125,10 @@ def _openness(chain: OdometryChain, loops: Sequence[Edge], first: IntArray, seco
     off = np.zeros(len(first))
     for begin in range(0, len(first), BLOCK):
         block = slice(begin, begin + BLOCK)
-        left, own, odometry, joined = cycles(chain, loops, first[block], second[block])
-        off[block][joined] = np.sqrt(squared_mahalanobis(left[joined], (own + odometry)[joined]))
+        cycle = cycles(chain, loops, first[block], second[block])
+        joined = cycle.joined
+        covariances = (cycle.loops + cycle.odometry)[joined]
+        off[block][joined] = np.sqrt(squared_mahalanobis(cycle.errors[joined], covariances))
     return off
 
 
