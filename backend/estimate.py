@@ -12,14 +12,14 @@ from semslam.types import FloatArray
 RELINEARIZE = 0.02
 """Radians and metres a pose must move before its factors are linearised again."""
 RELINEARIZE_EVERY = 10
-"""Updates between two looks at who has moved."""
+"""Updates between two checks of which poses have moved."""
 LOOSE = 10.0
 """Radians and metres: holds a map until its loops come; a looser one leaves the system badly conditioned."""
 NEVER = 2**30
 SETTLING_BUDGET, SETTLING_STEPS = 3_000, 3
-"""Keyframes times linearisations that a loop may cost, and linearisations at the most."""
+"""Keyframes times linearisations that a loop may cost, and the maximum number of linearisations."""
 GROSS = 50.0
-"""Times the limit that a loop may raise the error to first order and yet be worth a linearisation where it leads."""
+"""A loop that raises the error, to first order, by more than this many times the limit is not linearised."""
 CHUNK = 500
 """Keyframes of a solution that one step takes in."""
 

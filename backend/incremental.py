@@ -48,7 +48,7 @@ class IncrementalPoseGraph:
     A loop enters at once if it raises the graph's squared error by no more than a true one would (a likelihood
     ratio test); otherwise it waits. When enough loops wait, and whenever one joins two maps, the whole graph is judged
     robustly, as ``PoseGraph`` does it, and a new estimate made from the outcome takes the place of the running one:
-    loops are tried again, and a wrong one that came first does not bar those that come later. That work is spread: an
+    loops are tried again, and a false one that came first does not exclude later ones. That work is spread: an
     update does a number of its steps that depends on the number of keyframes alone, while the running estimate goes on.
     What comes in meanwhile is added to the new estimate before it takes over.
 

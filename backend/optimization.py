@@ -1,4 +1,4 @@
-"""From a checked graph to a solution: maps placed, covariances believed or widened, loops judged."""
+"""From a checked graph to a solution: maps placed, too small covariances widened, loops accepted or withdrawn."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -141,8 +141,8 @@ def _scales(problem: GraphProblem, loops: Sequence[Edge], config: BackendConfig)
     of_loops = loop_scale(chain, loops, config.max_loop_scale)
     widened = [loop.widened(of_loops) for loop in loops]
     of_cycles = cycle_scale(chain, widened, config.max_odometry_scale)
-    believable = min(SLACK * of_cycles, config.max_odometry_scale)
-    return max(of_cycles, odometry_scale(chain, widened, believable)), of_loops
+    limit = min(SLACK * of_cycles, config.max_odometry_scale)
+    return max(of_cycles, odometry_scale(chain, widened, limit)), of_loops
 
 
 def _screen(

@@ -216,7 +216,7 @@ def run_scale(arguments: argparse.Namespace) -> None:
         values = (
             f"{np.median(milliseconds):.1f} ms median, {np.percentile(milliseconds, 95):.0f} ms p95,"
             f" {np.median(milliseconds[~closing]):.1f} ms without and {np.median(milliseconds[closing]):.0f} ms with a"
-            f" loop, {milliseconds.max():.0f} ms at the most ({milliseconds[~judging].max():.0f} ms outside the"
+            f" loop, {milliseconds.max():.0f} ms maximum ({milliseconds[~judging].max():.0f} ms outside the"
             f" {judging.sum()} that judge loops), {(milliseconds > 500).sum()} over 0.5 s,"
             f" {spent[:, 0].sum():.0f} s in all"
         )

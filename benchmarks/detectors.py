@@ -1,4 +1,4 @@
-"""How well each loop detector tells true loops from wrong places, in other light too, and what verification leaves.
+"""How well each loop detector separates true loops from wrong places, in other light too, and what verification leaves.
 
     python benchmarks/detectors.py SEQUENCE... --detectors fused,dbow,conv3 --parts precision,calibration
 

@@ -92,7 +92,7 @@ class Remembered:
         self._known: dict[Hashable, LoopConstraint | LoopRejection] = {}
 
     def verify(self, query: Keyframe, match: Keyframe, candidate: LoopCandidate) -> LoopConstraint | LoopRejection:
-        """What the verifier says, or said before of the same two frames."""
+        """The verifier's outcome, stored from before for the same two frames."""
         key = (query.frame_index, match.frame_index, candidate.evidence.nodes)
         if key not in self._known:
             self._known[key] = self._verifier.verify(query, match, candidate)
@@ -250,8 +250,8 @@ def normalised_errors(recording: Recording, dataset: Dataset) -> FloatArray:
         if not (known[first] and known[last]) or any(motion.status is TrackingStatus.LOST for motion in motions):
             continue
         for motion in motions:
-            carry = adjoint(invert(motion.T_prev_cur))
-            covariance = carry @ covariance @ carry.T + motion.covariance
+            Ad = adjoint(invert(motion.T_prev_cur))
+            covariance = Ad @ covariance @ Ad.T + motion.covariance
             T = T @ motion.T_prev_cur
         errors.append(invert(invert(truth[first]) @ truth[last]) @ T)
         covariances.append(covariance)

@@ -101,13 +101,13 @@ def run_peer(peer: Sequence[str], path: Path, start: int, depth_scale: float) ->
     """ATE of each run of the peer."""
     dataset = open_dataset(path, DatasetConfig(start=start))
     camera = dataset.intrinsics
-    figures = [camera.fx, camera.fy, camera.cx, camera.cy, *(camera.distortion if camera.is_distorted else ())]
+    numbers = [camera.fx, camera.fy, camera.cx, camera.cy, *(camera.distortion if camera.is_distorted else ())]
     errors = []
     for _ in range(PEER_RUNS):
         with tempfile.TemporaryDirectory() as folder:
             out = Path(folder) / "trajectory.txt"
             command = [*peer, str(path), str(out), "--start", str(start), "--depth-scale", str(depth_scale)]
-            subprocess.run([*command, "--camera", *map(str, figures)], check=True, capture_output=True)
+            subprocess.run([*command, "--camera", *map(str, numbers)], check=True, capture_output=True)
             trajectory, _ = read_trajectory(out)
         errors.append(ate(dataset, trajectory.timestamps, trajectory.poses))
     return errors

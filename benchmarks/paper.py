@@ -43,7 +43,7 @@ def main() -> None:
 
 
 def semslam(*arguments: object) -> None:
-    """Run a command; one that fails has said why, and the others still run."""
+    """Run a command; one that fails has printed why, and the others still run."""
     print("semslam", *arguments, flush=True)
     subprocess.run([str(Path(sys.executable).with_name("semslam")), *map(str, arguments)], check=False)
 

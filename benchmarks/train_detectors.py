@@ -23,7 +23,7 @@ from semslam.loop.detectors.bag_of_words.word_index import Bag
 from semslam.loop.detectors.common.backbone import Backbone
 from semslam.loop.detectors.fused import fusion
 from semslam.loop.detectors.fused.photo_views import make_view, overlap
-from semslam.loop.detectors.fused.training import APART, Looks, train_fusion
+from semslam.loop.detectors.fused.training import APART, DescribedViews, train_fusion
 from semslam.loop.detectors.global_descriptor import cnnw, conv3
 from semslam.loop.detectors.sda import autoencoder
 from semslam.loop.detectors.sda import detector as sda
@@ -109,8 +109,8 @@ def fusion_from(folder: Path) -> None:
             pooled.append(fusion.pool_layers(encoding))
             bags.append(make_bag(tree, find_features(extractor, view.color).descriptors))
             classes.append(fusion.pool_classes(encoding.middle, segmenter.segment(view.color).labels, movable))
-    looks = Looks(np.array(photo_of), np.array(pooled), bags, classes)
-    model = train_fusion(looks, np.array(same), SEED)
+    described = DescribedViews(np.array(photo_of), np.array(pooled), bags, classes)
+    model = train_fusion(described, np.array(same), SEED)
     print(f"{len(same)} pairs of views of one place; weights {model.weights.round(2)}, bias {model.bias:.2f}")
     model.save(fusion.SHIPPED)
 

@@ -150,11 +150,11 @@ def ask_neighbours(part: Part) -> None:
         near = np.abs(ends - (query, match)).max(1)
         beside = np.flatnonzero((near > 0) & (near <= NEIGHBOURS)).tolist()
         alone[kind] += not beside
-        said = [
+        estimated = [
             part.poses[ends[i, 1]] @ here[i].T_match_query @ invert(part.poses[ends[i, 0]]) @ part.poses[query]
             for i in beside
         ]
-        away = [np.linalg.norm((invert(part.poses[match] @ loop.T_match_query) @ T)[:3, 3]) for T in said]
+        away = [np.linalg.norm((invert(part.poses[match] @ loop.T_match_query) @ T)[:3, 3]) for T in estimated]
         gaps[kind] += [100 * float(min(away))] if away else []
     for kind, distances in gaps.items():
         spread = np.percentile(distances, [50, 90, 99]).round(1) if distances else "-"

@@ -1,4 +1,4 @@
-"""What repeated runs say: mean, spread, and how sure both are."""
+"""Repeated runs: mean, spread, and the confidence interval of the mean."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -167,7 +167,7 @@ def coverage(timestamps: npt.ArrayLike, truth: Trajectory, window: float = MAX_D
 
 
 def coverage_remark(pairs: int | None, poses: int) -> str | None:
-    """A warning where errors are of less than half of the poses, which says little of the others; else None."""
+    """A warning where errors are of less than half of the poses, which are no measure of the others; else None."""
     if not pairs or pairs >= MIN_COVERAGE * poses:
         return None
     return f"The errors are of {pairs} of {poses} poses ({100 * pairs / poses:.0f} %); the others are not scored."

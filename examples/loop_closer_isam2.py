@@ -56,7 +56,7 @@ class Followed:
         return len(self._slots)
 
     def revise(self, isam: gtsam.ISAM2, odometry: gtsam.NonlinearFactorGraph) -> None:
-        """Put in what is believed by now, and take out what is not believed any more."""
+        """Add the closures that are accepted by now, and remove those that no longer are."""
         believed = [closure.factor for closure in self._closer.believed(odometry)]
         fresh = [factor for factor in believed if factor not in self._slots]
         gone = [self._slots.pop(factor) for factor in set(self._slots).difference(believed)]

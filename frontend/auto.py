@@ -9,7 +9,7 @@ from semslam.frontend.frame_to_frame.dense import DenseConfig, DenseOdometry
 
 
 class AutoOdometry(FeatureMapOdometry):
-    """Tracks against the feature map, and registers frames densely to one another while the map is not met.
+    """Tracks against the feature map, and registers frames densely to one another while they do not match the map.
 
     DEGRADED where dense registration stood in.
     """

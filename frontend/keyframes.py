@@ -72,7 +72,7 @@ class KeyframeBuilder:
 
     Args:
         config: settings of keypoints, keyframes and verification.
-        policy: which frames become keyframes; None = by time and motion, as the settings say.
+        policy: which frames become keyframes; None = by time and motion, as set.
         details: whether keyframes get the further keypoints that loop verification uses.
     """
 

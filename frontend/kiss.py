@@ -10,9 +10,9 @@ from semslam.geometry.se3 import invert, is_rigid, rotation_angle
 from semslam.types import FloatArray, Frame, Motion, TrackingStatus
 
 ALONG_SURFACE = 0.03
-"""What a point says along its surface, as a share of what it says across it: little, but edges and texture hold."""
+"""A point's information along its surface as a share of that across it: small, but edges constrain a little."""
 NEIGHBOURS = 12
-"""Points that tell a surface's normal."""
+"""Neighbouring points from which a surface's normal is computed."""
 
 
 class KissConfig(Section):
@@ -50,7 +50,7 @@ class KissOdometry:
         return cls(config.section(cls.name, cls.Settings))
 
     def track(self, frame: Frame) -> Motion:
-        """Motion since the previous frame; LOST where there is too little depth or the map does not meet it.
+        """Motion since the previous frame; LOST where there is too little depth or the scan does not match the map.
 
         Raises:
             DatasetError: the frame's size does not fit its intrinsics.
@@ -85,7 +85,7 @@ class KissOdometry:
             return first_motion()
         self._lost_since = timestamp if self._lost_since is None else self._lost_since
         self._recent = RecentVelocity()
-        # A scan that the map does not meet has been written into it, so the map starts anew.
+        # A scan that does not match the map has been written into it, so the map starts anew.
         if len(points) >= self._config.min_points:
             self._icp = _make_icp(self._config)
             self._icp.last_pose = T_odom_prev
@@ -106,8 +106,8 @@ class KissOdometry:
     def _covariance(self, source: FloatArray, departure: FloatArray) -> FloatArray:
         """How well surfaces of this shape fix a pose, and how far the motion departs from those before it.
 
-        Points slide along their surface: where all of it is one wall, nothing holds the scan in place. A scan that
-        slides looks as well registered as any other, but it takes the camera where it was not heading.
+        Points slide along their surface: where all of it is one wall, nothing constrains the scan. A scan that
+        slides fits as well as any other, but its motion departs from the camera's velocity.
         """
         normals = _normals(source)
         across = np.hstack([np.cross(source, normals), normals])

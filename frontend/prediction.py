@@ -1,4 +1,4 @@
-"""Where the camera will be, before its image is looked at; and what to say of a frame that could not be tracked."""
+"""Where the camera will be, before its image is looked at; and what to report of a frame that could not be tracked."""
 
 from collections import deque
 
@@ -44,7 +44,7 @@ class ConstantVelocity:
         self._timestamp = self._tracked_at = timestamp
 
     def lost(self, timestamp: float, map_id: int) -> Motion:
-        """What to report of a frame at ``timestamp`` that could not be tracked: a predicted motion, hardly certain."""
+        """The motion of a frame at ``timestamp`` that could not be tracked: predicted, with a wide covariance."""
         motion = self.predict(timestamp)
         elapsed = timestamp - self._timestamp if self._timestamp is not None else 0.0
         self._timestamp = timestamp
@@ -52,7 +52,7 @@ class ConstantVelocity:
 
 
 class RecentVelocity:
-    """The camera's mean velocity over the last second, from which a registration that slips departs."""
+    """The camera's mean velocity over the last second, from which a registration that slides departs."""
 
     def __init__(self) -> None:
         self._last: float | None = None
@@ -82,7 +82,7 @@ def wide_covariance(seconds: float) -> FloatArray:
 
 
 def first_motion(map_id: int = 0) -> Motion:
-    """What every odometry says of its first frame: identity, all but certain."""
+    """What every odometry reports of its first frame: identity, with a tiny covariance."""
     return Motion(np.eye(4), np.eye(6) * 1e-12, TrackingStatus.OK, map_id)
 
 

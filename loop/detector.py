@@ -14,8 +14,8 @@ class LoopDetector(Protocol):
     view. Deterministic for a seed.
 
     Attributes:
-        name: the registered name, which its candidates carry.
-        needs_labels: whether the views must carry a segmentation.
+        name: the registered name, which its candidates state.
+        needs_labels: whether the views must hold a segmentation.
     """
 
     name: str
@@ -29,7 +29,7 @@ class LoopDetector(Protocol):
     def query(self, view: KeyframeView) -> list[LoopCandidate]:
         """Candidates among the added keyframes at least ``loops.min_gap`` older, best first; no side effect.
 
-        An empty list means that nothing looks like this place. Scores are in 0..1.
+        An empty list means that no earlier keyframe is similar enough. Scores are in 0..1.
         """
 
     def add(self, view: KeyframeView) -> None:

@@ -1,4 +1,4 @@
-"""Following a loop: once a place is known again, the keyframes that come after it are at known places too."""
+"""Following a loop: after a verified loop, odometry predicts which earlier keyframes the next ones overlap."""
 
 from collections import deque
 from collections.abc import Sequence
@@ -10,22 +10,22 @@ from semslam.geometry.se3 import invert, transform_points
 from semslam.types import FloatArray, Keyframe, LoopCandidate, LoopConstraint, LoopEvidence, Verification
 
 GAP_SHARE = 0.5
-"""Share of ``loops.min_gap`` that must lie between followed frames: what the loops before say bears them out."""
+"""Share of ``loops.min_gap`` that must lie between followed frames, which earlier loops support."""
 ENOUGH = 3
 """Verified loops of a keyframe after which no more are looked for."""
 POINTS = 50
-"""Points of a cloud that stand for it."""
+"""Points of a cloud that are sampled to predict overlap."""
 MIN_SEEN = 0.3
-"""Share of them that an earlier view must hold."""
+"""Share of them that must lie in an earlier view."""
 NEAREST, FARTHEST = 0.2, 6.0
-"""Metres from the camera at which a view holds points."""
+"""Range of distances, in metres, at which points count as in view."""
 
 
 class LoopFollower:
-    """Proposes earlier views of what a keyframe sees, by where the last verified loop puts it.
+    """Proposes earlier keyframes whose views overlap the newest one's, by the last verified loop and odometry.
 
-    A detector that names a place once need not name it again: from there odometry says for a while which earlier
-    keyframes look at the same things. Proposes nothing before the first verified loop, and the detector's own
+    A detector that names a place once need not name it again: from there odometry predicts for a while which
+    earlier keyframes see the same surfaces. Proposes nothing before the first verified loop, and the detector's own
     candidates always come before. It is the verification that decides, as with any candidate.
     """
 
@@ -65,7 +65,7 @@ class LoopFollower:
     def propose(self, keyframes: Sequence[Keyframe]) -> LoopCandidate | None:
         """The next earlier keyframe to verify with the newest one, or None where no more should be.
 
-        Those that hold most of what it sees come first, ``loops.follow`` of them at the most. The outcomes of the
+        Those that hold most of what it sees come first, at most ``loops.follow`` of them. The outcomes of the
         detector's candidates and of each proposal are to be noted before the next is asked for.
 
         Args:

@@ -1,4 +1,4 @@
-"""The one family of errors that semslam raises for what a user can mend, and its warning."""
+"""The one family of errors that semslam raises for what a user can correct, and its warning."""
 
 
 def printable(text: str) -> str:

@@ -43,7 +43,7 @@ class Certificate:
 
     @property
     def gap(self) -> float | None:
-        """By how much other poses may cost less at the most, as a share of the bound (of 1 where that is less)."""
+        """How much less other poses can cost, at most, as a share of the bound (of 1 where the bound is less)."""
         return None if self.bound is None else max(self.cost - self.bound, 0.0) / max(self.bound, 1.0)
 
     @property
@@ -53,11 +53,11 @@ class Certificate:
 
 
 def certify(solution: GraphSolution) -> Certificate:
-    """Certify the poses of a solution for odometry and the accepted loops, as far as they were believed.
+    """Certify the poses of a solution for odometry and the accepted loops, with the solution's scales applied.
 
     Directions of translation count alike, correlations with rotation do not count, and the best known axis of rotation
     counts no more than the other two together. Where covariances are far from that, the poses are not the optimum of
-    this cost, and the gap says so.
+    this cost, and the gap is large.
     """
     row = {key: index for index, key in enumerate(solution.poses)}
     edges = solution.widened

@@ -1,4 +1,4 @@
-"""Graphs from elsewhere: which of their edges are odometry, and which loops can be believed."""
+"""Graphs from elsewhere: which of their edges are odometry, and which of their loops are accepted."""
 
 from collections.abc import Mapping, Sequence
 

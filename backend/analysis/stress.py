@@ -1,4 +1,4 @@
-"""False loops thrown at a graph that is known to be good, to see which strategy withstands them."""
+"""False loops added to a graph that is known to be good, to measure which strategies reject them."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from semslam.geometry.se3 import exp_so3, invert, make_transform
 from semslam.types import FloatArray, LoopConstraint
 
 GROUP = 6
-"""Loops of one look-alike place."""
+"""False loops in one consistent group."""
 MIN_GAP = 10
 """Keyframes that must lie between the ends of a false loop."""
 SPREAD_RAD, SPREAD_M = 0.3, 0.5
@@ -32,11 +32,11 @@ class FalseLoopKind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Attack:
-    """False loops to be thrown at a graph.
+    """False loops to be added to a graph.
 
     Attributes:
         share: false ones among all loops, 0 to below 1.
-        kind: unrelated to one another, or groups that agree among themselves as look-alike places do.
+        kind: unrelated to one another, or groups of consistent ones, as between places that look alike.
         seed: of the false loops.
 
     Raises:

@@ -11,7 +11,7 @@ import gtsam
 import numpy as np
 import numpy.typing as npt
 
-from semslam.backend.bundle.observations import Sightings, gather, reprojection_errors, thinned
+from semslam.backend.bundle.observations import ObservationTable, gather, reprojection_errors, thinned
 from semslam.backend.graph.checks import checked_pose
 from semslam.backend.graph.factors import (
     ANCHOR_SIGMA,
@@ -85,26 +85,26 @@ def adjust(
         GraphError: a pose is not a finite rigid transform, or the optimiser failed.
     """
     poses = {key: checked_pose(T, f"The pose of keyframe {key}") for key, T in poses.items()}
-    sightings = gather(poses, observations, intrinsics, config.min_views)
-    if not len(sightings) or not config.rounds:
+    observed = gather(poses, observations, intrinsics, config.min_views)
+    if not len(observed) or not config.rounds:
         return BundleResult(poses, (), 0)
-    sightings = thinned(sightings, config.max_observations)
+    observed = thinned(observed, config.max_observations)
     values = make_values(poses)
-    for landmark, point in enumerate(sightings.points):
+    for landmark, point in enumerate(observed.points):
         values.insert(gtsam.symbol("l", landmark), point)
-    factors = _observation_factors(sightings, intrinsics, config)
+    factors = _observation_factors(observed, intrinsics, config)
     held = _pose_factors(poses, edges, config.observation_share)
-    kept = np.ones(len(sightings), dtype=bool)
+    kept = np.ones(len(observed), dtype=bool)
     rounds = []
     for _ in range(config.rounds):
         values = _adjusted(held, factors, kept, values, config.iterations)
-        fresh = sightings.moved(read_poses(values, poses), values)
+        fresh = observed.moved(read_poses(values, poses), values)
         errors, depths = reprojection_errors(fresh, intrinsics, config.baseline)
         inside = (depths > 0) & (_whitened(errors, fresh, config) <= config.outlier)
         dropped = int((kept & ~inside).sum())
         rounds.append(BundleRound(int(kept.sum()), dropped, _rmse(errors[kept & inside])))
         kept &= inside
-    return BundleResult(read_poses(values, poses), tuple(rounds), len(sightings.points))
+    return BundleResult(read_poses(values, poses), tuple(rounds), len(observed.points))
 
 
 def _adjusted(
@@ -127,19 +127,19 @@ def _adjusted(
 
 
 def _observation_factors(
-    sightings: Sightings, intrinsics: Intrinsics, config: BundleConfig
+    observed: ObservationTable, intrinsics: Intrinsics, config: BundleConfig
 ) -> list[gtsam.NonlinearFactor]:
     camera = (intrinsics.fx, intrinsics.fy, 0.0, intrinsics.cx, intrinsics.cy)
     stereo, mono = gtsam.Cal3_S2Stereo(*camera, config.baseline), gtsam.Cal3_S2(*camera)
-    noises = {sigma: _noises(sigma, config) for sigma in np.unique(sightings.sigmas).tolist()}
-    sigmas = sightings.sigmas.tolist()
-    right = sightings.right_u(intrinsics, config.baseline).tolist()
-    keys, landmarks = sightings.keys.tolist(), sightings.landmarks.tolist()
+    noises = {sigma: _noises(sigma, config) for sigma in np.unique(observed.sigmas).tolist()}
+    sigmas = observed.sigmas.tolist()
+    right = observed.right_u(intrinsics, config.baseline).tolist()
+    keys, landmarks = observed.keys.tolist(), observed.landmarks.tolist()
     factors: list[gtsam.NonlinearFactor] = []
-    for i, (u, v) in enumerate(sightings.pixels.tolist()):
+    for i, (u, v) in enumerate(observed.pixels.tolist()):
         point = gtsam.symbol("l", landmarks[i])
         stereo_noise, mono_noise = noises[sigmas[i]]
-        if sightings.depths[i] > 0:
+        if observed.depths[i] > 0:
             pair = gtsam.StereoPoint2(u, right[i], v)
             factors.append(gtsam.GenericStereoFactor3D(pair, stereo_noise, keys[i], point, stereo, False, False))
         else:
@@ -162,7 +162,7 @@ def _noises(sigma: float, config: BundleConfig) -> tuple[gtsam.noiseModel.Robust
 def _pose_factors(
     poses: Mapping[int, FloatArray], edges: Sequence[Edge], observation_share: float
 ) -> gtsam.NonlinearFactorGraph:
-    """The edges, held as much tighter as sightings are to count less: so outliers stay a matter of pixels."""
+    """The edges, tightened by as much as observations count less: so the outlier threshold stays in pixels."""
     graph = gtsam.NonlinearFactorGraph()
     for index, (key, T_world_cam) in enumerate(sorted(poses.items())):
         graph.add(prior_factor(key, T_world_cam, FLOATING_SIGMA if index else ANCHOR_SIGMA))
@@ -171,9 +171,9 @@ def _pose_factors(
     return graph
 
 
-def _whitened(errors: FloatArray, sightings: Sightings, config: BundleConfig) -> FloatArray:
+def _whitened(errors: FloatArray, observed: ObservationTable, config: BundleConfig) -> FloatArray:
     weights = np.array([1.0, 1.0, config.disparity_weight])
-    return np.asarray(np.sqrt((errors**2 * weights).sum(1)) / (config.pixel_sigma * sightings.sigmas))
+    return np.asarray(np.sqrt((errors**2 * weights).sum(1)) / (config.pixel_sigma * observed.sigmas))
 
 
 def _rmse(errors: FloatArray) -> float:

@@ -17,16 +17,16 @@ from semslam.geometry.se3 import invert
 from semslam.types import FloatArray, Intrinsics, Observations
 
 GATE = 7.815
-"""Chi-square of three degrees of freedom at 95 %: sightings farther off are left out of a registration."""
+"""Chi-square of three degrees of freedom at 95 %: observations farther off are left out of a registration."""
 
 
 class Covisibility:
     """Binds each keyframe to the older ones that share most landmarks with it.
 
-    The keyframe before is left to odometry, which says all there is to say of the two. An edge holds the relative pose
-    that the tracker found, which rests on more of the map than one pair sees: so edges say nothing new of where
-    keyframes are, only how firmly they hang together. How firmly, a registration of the pair by the landmarks that both
-    see tells: its formal covariance, widened since neighbours repeat their errors.
+    The previous keyframe is left to odometry, whose edge holds the same information. An edge holds the relative pose
+    that the tracker found, which rests on more of the map than one pair sees: so edges do not move keyframes, they only
+    stiffen the graph. The edge's covariance is the formal one of a registration of the pair by the landmarks that both
+    observe, widened since neighbours repeat their errors.
     """
 
     def __init__(self, config: CovisibilityConfig) -> None:
@@ -59,13 +59,13 @@ class Covisibility:
         return tuple(edge for edge in edges if edge is not None)
 
     def _edge(self, older: int, newer: int, intrinsics: Intrinsics) -> Edge | None:
-        """What binds two keyframes, or None where too few sightings agree on a pose."""
+        """The edge between two keyframes, or None where too few observations agree on a pose."""
         there, here = self._seen[older], self._seen[newer]
         _, rows, columns = np.intersect1d(there.landmarks, here.landmarks, return_indices=True)
         deep = there.depths[rows] > 0
         rows, columns = rows[deep], columns[deep]
         points = lift(there.pixels[rows], there.depths[rows], intrinsics).astype(np.float64)
-        sigmas = np.hypot(_sigmas(there)[rows], _sigmas(here)[columns])  # either sighting errs
+        sigmas = np.hypot(_sigmas(there)[rows], _sigmas(here)[columns])  # both observations have errors
         seen = measure(here.pixels[columns], here.depths[columns], sigmas)
         T_older_newer = invert(self._poses[older]) @ self._poses[newer]
         found = refine_pose(T_older_newer, points, seen, intrinsics, GATE)

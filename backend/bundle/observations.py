@@ -11,7 +11,7 @@ from semslam.types import FloatArray, IntArray, Intrinsics, Observations
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Sightings:
+class ObservationTable:
     """M observations of L landmarks from keyframes.
 
     Attributes:
@@ -40,7 +40,7 @@ class Sightings:
         depths = np.where(self.depths > 0, self.depths, 1.0)
         return self.pixels[:, 0] - intrinsics.fx * baseline / depths
 
-    def moved(self, poses: Mapping[int, FloatArray], values: gtsam.Values) -> "Sightings":
+    def moved(self, poses: Mapping[int, FloatArray], values: gtsam.Values) -> "ObservationTable":
         """The same observations of landmarks and keyframes that have moved."""
         points = np.stack([values.atPoint3(gtsam.symbol("l", row)) for row in range(len(self.points))])
         return replace(self, points=points, local=_local(poses, self.keys, points[self.landmarks]))
@@ -51,10 +51,10 @@ def gather(
     observations: Mapping[int, Observations],
     intrinsics: Intrinsics,
     min_views: int,
-) -> Sightings:
+) -> ObservationTable:
     """Collect the landmarks that enough keyframes see, at least one of them with depth.
 
-    A landmark starts at the mean of where its sightings with depth put it, near ones counting more.
+    A landmark starts at the mean position of its observations with depth, near ones counting more.
     """
     seen = [(key, one) for key, one in sorted(observations.items()) if key in poses and len(one.landmarks)]
     if not seen:
@@ -75,18 +75,18 @@ def gather(
     keys, pixels, depths, sigmas = keys[good], pixels[good], depths[good], sigmas[good].astype(np.float64)
     _, rows = np.unique(identities[good], return_inverse=True)
     points = _starting_points(poses, keys, rows, pixels, depths, intrinsics)
-    return Sightings(keys, rows, pixels, depths, sigmas, points, _local(poses, keys, points[rows]))
+    return ObservationTable(keys, rows, pixels, depths, sigmas, points, _local(poses, keys, points[rows]))
 
 
-def thinned(sightings: Sightings, wanted: int) -> Sightings:
+def thinned(observed: ObservationTable, wanted: int) -> ObservationTable:
     """Keep the landmarks that most keyframes see, until each keyframe has about ``wanted`` observations.
 
     A landmark stays while at least half of the keyframes that see it still want more.
     """
-    views = np.bincount(sightings.landmarks)
-    by_landmark = np.argsort(sightings.landmarks, kind="stable")
-    seen_from = np.split(sightings.keys[by_landmark], np.cumsum(views)[:-1])
-    missing = dict.fromkeys(sightings.keys.tolist(), wanted)
+    views = np.bincount(observed.landmarks)
+    by_landmark = np.argsort(observed.landmarks, kind="stable")
+    seen_from = np.split(observed.keys[by_landmark], np.cumsum(views)[:-1])
+    missing = dict.fromkeys(observed.keys.tolist(), wanted)
     kept = np.zeros(len(views), dtype=bool)
     for landmark in np.argsort(-views, kind="stable").tolist():
         keys = seen_from[landmark].tolist()
@@ -94,31 +94,33 @@ def thinned(sightings: Sightings, wanted: int) -> Sightings:
             kept[landmark] = True
             for key in keys:
                 missing[key] -= 1
-    stays = kept[sightings.landmarks]
-    return Sightings(
-        keys=sightings.keys[stays],
-        landmarks=(np.cumsum(kept) - 1)[sightings.landmarks[stays]],
-        pixels=sightings.pixels[stays],
-        depths=sightings.depths[stays],
-        sigmas=sightings.sigmas[stays],
-        points=sightings.points[kept],
-        local=sightings.local[stays],
+    stays = kept[observed.landmarks]
+    return ObservationTable(
+        keys=observed.keys[stays],
+        landmarks=(np.cumsum(kept) - 1)[observed.landmarks[stays]],
+        pixels=observed.pixels[stays],
+        depths=observed.depths[stays],
+        sigmas=observed.sigmas[stays],
+        points=observed.points[kept],
+        local=observed.local[stays],
     )
 
 
-def reprojection_errors(sightings: Sightings, intrinsics: Intrinsics, baseline: float) -> tuple[FloatArray, FloatArray]:
+def reprojection_errors(
+    observed: ObservationTable, intrinsics: Intrinsics, baseline: float
+) -> tuple[FloatArray, FloatArray]:
     """Errors (M, 3) in pixels of u, v and virtual disparity (0 without depth), and the landmarks' depths (M,)."""
-    z = sightings.local[:, 2]
+    z = observed.local[:, 2]
     ahead = np.where(z > 0, z, 1.0)
-    local = np.column_stack([sightings.local[:, :2], ahead])
-    pixel_errors = intrinsics.project(local) - sightings.pixels
-    has_depth = sightings.depths > 0
-    measured = 1.0 / np.where(has_depth, sightings.depths, ahead)
+    local = np.column_stack([observed.local[:, :2], ahead])
+    pixel_errors = intrinsics.project(local) - observed.pixels
+    has_depth = observed.depths > 0
+    measured = 1.0 / np.where(has_depth, observed.depths, ahead)
     disparity_errors = intrinsics.fx * baseline * (1.0 / ahead - measured)
     return np.column_stack([pixel_errors, disparity_errors]), z
 
 
-_NOTHING = Sightings(
+_NOTHING = ObservationTable(
     keys=np.zeros(0, np.int64),
     landmarks=np.zeros(0, np.int64),
     pixels=np.zeros((0, 2)),

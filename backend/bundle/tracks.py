@@ -27,7 +27,7 @@ class MatchedFeatures:
 def join_tracks(features: Mapping[int, Features], pairs: Sequence[MatchedFeatures]) -> dict[int, Observations]:
     """What each keyframe sees of the landmarks that chains of matches make up.
 
-    A chain that comes back to a keyframe at another feature holds a wrong match, no telling which; it is left out.
+    A chain that comes back to a keyframe at another feature holds a wrong match; it is left out as a whole.
 
     Args:
         features: of each keyframe, by key.

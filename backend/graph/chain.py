@@ -1,4 +1,4 @@
-"""What odometry alone says of two keyframes, however far apart: their relative pose and its covariance."""
+"""Relative pose and covariance of any two keyframes by odometry alone."""
 
 from collections.abc import Iterable, Iterator
 from itertools import pairwise
@@ -40,8 +40,8 @@ class OdometryChain:
             self._T[row] = orthonormalise(self._T[row - 1] @ T_last_key)
             covariances[row] = edge.covariance
             right[row] = row if forward else row - 1
-        carry = adjoints(self._T[right])
-        self._covariance = carry @ covariances @ np.swapaxes(carry, 1, 2)
+        Ad = adjoints(self._T[right])
+        self._covariance = Ad @ covariances @ np.swapaxes(Ad, 1, 2)
         for chain in np.split(self._covariance, np.flatnonzero(np.diff(self._chain)) + 1):
             np.cumsum(chain, axis=0, out=chain)
 
@@ -57,10 +57,10 @@ class OdometryChain:
         """
         rows_a, rows_b = self._rows(a), self._rows(b)
         T_b = self._T[rows_b]
-        carry = adjoints(invert(T_b))
+        Ad = adjoints(invert(T_b))
         # The way from the chain's start to the earlier of the two is shared and cancels.
         shared = self._covariance[np.minimum(rows_a, rows_b)]
-        covariance = carry @ (self._covariance[np.maximum(rows_a, rows_b)] - shared) @ np.swapaxes(carry, 1, 2)
+        covariance = Ad @ (self._covariance[np.maximum(rows_a, rows_b)] - shared) @ np.swapaxes(Ad, 1, 2)
         return invert(self._T[rows_a]) @ T_b, covariance, self._chain[rows_a] == self._chain[rows_b]
 
     def poses(self) -> Iterator[tuple[int, int, FloatArray]]:

@@ -1,4 +1,4 @@
-"""The border to GTSAM: it takes a NaN or a skewed rotation without a word, so nothing unchecked gets past here."""
+"""The border to GTSAM: it accepts a NaN or a skewed rotation without an error, so everything is checked here."""
 
 import numpy as np
 import numpy.typing as npt

@@ -1,4 +1,4 @@
-"""Maps that do not hang together, and how a loop brings one to the other."""
+"""Connected components of the graph, and their placement by the loops between them."""
 
 from collections.abc import Iterable, Mapping, Sequence
 

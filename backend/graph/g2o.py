@@ -34,7 +34,7 @@ SKIPPED = ("VERTEX2", "EDGE2", "VERTEX_SE2", "EDGE_SE2")
 
 
 def write_g2o(path: Path, graph: PosedGraph | GraphSolution) -> None:
-    """Write a graph, whole or not at all; figures keep every digit.
+    """Write a graph, whole or not at all; numbers keep every digit.
 
     Of a solution the optimised poses are written, with odometry and the accepted loops.
 
@@ -45,8 +45,8 @@ def write_g2o(path: Path, graph: PosedGraph | GraphSolution) -> None:
     lines += [f"FIX {key}" for key in graph.anchors]
     for edge in graph.edges:
         information = np.linalg.inv(edge.covariance)[np.ix_(SWAPPED, SWAPPED)]
-        figures = " ".join(repr(float(value)) for value in information[TRIANGLE])
-        lines.append(f"EDGE_SE3:QUAT {edge.from_key} {edge.to_key} {_pose_text(edge.T_from_to)} {figures}")
+        numbers = " ".join(repr(float(value)) for value in information[TRIANGLE])
+        lines.append(f"EDGE_SE3:QUAT {edge.from_key} {edge.to_key} {_pose_text(edge.T_from_to)} {numbers}")
     try:
         partial = path.with_name(f".{path.name}.partial")
         partial.write_text("\n".join(lines) + "\n", encoding="ascii")
@@ -122,12 +122,12 @@ def _numbers(words: list[str], where: str) -> list[float]:
         raise GraphError(f"{where} holds a word that is not a number.") from None
 
 
-def _pose(figures: list[float], where: str) -> FloatArray:
+def _pose(numbers: list[float], where: str) -> FloatArray:
     try:
-        R = quaternions_to_rotations(figures[3:])[0] if len(figures) == 7 else _rotation_of_euler(*figures[3:])
+        R = quaternions_to_rotations(numbers[3:])[0] if len(numbers) == 7 else _rotation_of_euler(*numbers[3:])
     except SemslamError:
         raise GraphError(f"{where} has a rotation that is zero or not finite.") from None
-    return checked_pose(make_transform(R, figures[:3]), where)
+    return checked_pose(make_transform(R, numbers[:3]), where)
 
 
 def _rotation_of_euler(roll: float, pitch: float, yaw: float) -> FloatArray:
@@ -143,15 +143,15 @@ def _rotation_of_euler(roll: float, pitch: float, yaw: float) -> FloatArray:
 
 def _edge(tag: str, words: list[str], where: str) -> Edge:
     from_key, to_key = (_key(word, where) for word in words[:2])
-    figures = _numbers(words[3 if tag == SWITCHABLE else 2 :], where)
+    numbers = _numbers(words[3 if tag == SWITCHABLE else 2 :], where)
     information = np.zeros((6, 6))
-    information[TRIANGLE] = figures[-21:]
+    information[TRIANGLE] = numbers[-21:]
     information += np.triu(information, 1).T
     try:
         covariance = np.linalg.inv(information)[np.ix_(SWAPPED, SWAPPED)]
     except np.linalg.LinAlgError:
         raise GraphError(f"{where} has an information matrix that cannot be inverted.") from None
-    T_from_to = _pose(figures[:-21], where)
+    T_from_to = _pose(numbers[:-21], where)
     return Edge(from_key, to_key, T_from_to, checked_covariance(covariance, where), is_loop=tag == SWITCHABLE)
 
 
@@ -164,5 +164,5 @@ def _chain(poses: dict[int, FloatArray], edges: list[Edge]) -> None:
 
 
 def _pose_text(T: FloatArray) -> str:
-    figures = [*T[:3, 3], *rotations_to_quaternions(T[:3, :3])[0]]
-    return " ".join(repr(float(value)) for value in figures)
+    numbers = [*T[:3, 3], *rotations_to_quaternions(T[:3, :3])[0]]
+    return " ".join(repr(float(value)) for value in numbers)

@@ -48,7 +48,7 @@ class PosedGraph:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LoopVerdict:
-    """What the optimised graph says of one loop.
+    """The verdict of the optimised graph on one loop.
 
     Attributes:
         constraint: the loop.
@@ -79,7 +79,7 @@ class GraphSolution:
         cost: half the weighted sum of squared residuals of odometry and loops.
         odometry_scale: factor on odometry's standard deviations (``semslam.backend.robust.calibration``).
         loop_scale: the same of the loops'.
-        components: keys that hang together by odometry and accepted loops; the largest set first.
+        components: sets of keys connected by odometry and accepted loops; the largest set first.
         covisible: edges between keyframes that see the same landmarks, which took part beside ``edges``.
     """
 
@@ -105,7 +105,7 @@ class GraphSolution:
 
     @property
     def widened(self) -> list[Edge]:
-        """Odometry, then the accepted loops, as far as they were believed."""
+        """Odometry, then the accepted loops, with the solution's scales applied."""
         odometry = [edge.widened(self.odometry_scale) for edge in self.odometry]
         return odometry + [edge.widened(self.loop_scale) for edge in self.loops]
 

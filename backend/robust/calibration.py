@@ -1,4 +1,4 @@
-"""Whether the stated covariances can be believed: loops that agree with one another tell.
+"""Estimates from mutually consistent loops by how much the stated covariances are too small.
 
 A front end that drifts by a bias it does not know of states too small a covariance; every true loop then looks
 false. Where most loops contradict odometry, odometry is what is wrong, and its covariance is widened until a
@@ -6,6 +6,7 @@ quarter of the loops, fewer than may be expected to be true, lie as they should.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from semslam.geometry.se3 import invert
 from semslam.types import FloatArray, IntArray
 
 QUORUM = 5
-"""Fewer loops than this are no evidence against odometry."""
+"""Minimum number of loops that are evidence against odometry."""
 QUARTILE, QUARTILE_CHI2 = 25.0, 3.4546
 """A quarter of true loops lie below this squared Mahalanobis distance (6 degrees of freedom)."""
 MEDIAN, MEDIAN_CHI2 = 50.0, 5.3481
@@ -30,7 +31,24 @@ NEIGHBOURHOOD = 3
 STRETCH = 20
 """Keyframes of odometry that a cycle through two loops may hold on either side."""
 MAX_CYCLES = 2000
-"""Loops, and cycles through two of them, that are looked at; of more, every n-th."""
+"""Maximum number of loops, and of cycles through two of them, that are used; of more, every n-th."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CycleErrors:
+    """Closure errors of P cycles through two loops and the odometry between their ends.
+
+    Attributes:
+        errors: (P, 6) tangent vectors of what is left when going round, rotation first.
+        loops: (P, 6, 6) covariances from the two loops.
+        odometry: (P, 6, 6) covariances from odometry.
+        joined: (P,) whether odometry joins both ends; the other rows are meaningless.
+    """
+
+    errors: FloatArray
+    loops: FloatArray
+    odometry: FloatArray
+    joined: BoolArray
 
 
 def cycle_scale(chain: OdometryChain, loops: Sequence[Edge], limit: float) -> float:
@@ -48,8 +66,11 @@ def cycle_scale(chain: OdometryChain, loops: Sequence[Edge], limit: float) -> fl
     if not len(chosen):
         return 1.0
     chosen = chosen[:: -(-len(chosen) // MAX_CYCLES)]
-    left, own, odometry, joined = cycles(chain, loops, first[chosen], second[chosen])
-    return _smallest_scale(left[joined], own[joined], odometry[joined], limit, MEDIAN, MEDIAN_CHI2)
+    closed = cycles(chain, loops, first[chosen], second[chosen])
+    joined = closed.joined
+    return _smallest_scale(
+        closed.errors[joined], closed.loops[joined], closed.odometry[joined], limit, MEDIAN, MEDIAN_CHI2
+    )
 
 
 def odometry_scale(chain: OdometryChain, loops: Sequence[Edge], limit: float) -> float:
@@ -71,24 +92,21 @@ def loop_scale(chain: OdometryChain, loops: Sequence[Edge], limit: float) -> flo
     if not pairs:
         return 1.0
     first, second = np.array(pairs).T
-    left, own, odometry, joined = cycles(chain, loops, first, second)
-    return _smallest_scale(left[joined], odometry[joined], own[joined], limit, MEDIAN, MEDIAN_CHI2)
+    closed = cycles(chain, loops, first, second)
+    joined = closed.joined
+    return _smallest_scale(
+        closed.errors[joined], closed.odometry[joined], closed.loops[joined], limit, MEDIAN, MEDIAN_CHI2
+    )
 
 
-def cycles(
-    chain: OdometryChain, loops: Sequence[Edge], first: IntArray, second: IntArray
-) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
-    """How far pairs of loops are from closing a cycle with the odometry between their ends.
+def cycles(chain: OdometryChain, loops: Sequence[Edge], first: IntArray, second: IntArray) -> CycleErrors:
+    """Closure errors of the cycles through pairs of loops and the odometry between their ends.
 
     Args:
         chain: odometry.
         loops: the loops.
         first: (P,) index of one loop of each pair.
         second: (P,) index of the other.
-
-    Returns:
-        (P, 6) what is left when going round, (P, 6, 6) its covariance from the two loops, (P, 6, 6) from odometry,
-        and (P,) whether odometry joins both ends.
     """
     T_match_query = np.stack([loop.T_from_to for loop in loops])
     covariances = np.stack([loop.covariance for loop in loops])
@@ -99,10 +117,10 @@ def cycles(
     T_q1_q2, C_q, joined_q = chain.relative(queries[first], queries[second])
     # Round the cycle, everything expressed at the second loop's query.
     left = invert(T_m1_m2 @ T_m2_q2) @ T_m1_q1 @ T_q1_q2
-    carry_1, carry_m = adjoints(invert(T_q1_q2)), adjoints(invert(T_m2_q2))
-    own = covariances[second] + carry_1 @ covariances[first] @ np.swapaxes(carry_1, 1, 2)
-    odometry = C_q + carry_m @ C_m @ np.swapaxes(carry_m, 1, 2)
-    return deviations(left), own, odometry, joined_m & joined_q
+    Ad_1, Ad_m = adjoints(invert(T_q1_q2)), adjoints(invert(T_m2_q2))
+    own = covariances[second] + Ad_1 @ covariances[first] @ np.swapaxes(Ad_1, 1, 2)
+    odometry = C_q + Ad_m @ C_m @ np.swapaxes(Ad_m, 1, 2)
+    return CycleErrors(deviations(left), own, odometry, joined_m & joined_q)
 
 
 def _neighbours(loops: Sequence[Edge]) -> list[tuple[int, int]]:

@@ -45,9 +45,9 @@ def agreement(chain: OdometryChain, loops: Sequence[Edge], max_residual: float) 
     first, second = np.triu_indices(count, 1)
     for begin in range(0, len(first), BLOCK):
         i, j = first[begin : begin + BLOCK], second[begin : begin + BLOCK]
-        left, own, odometry, joined = cycles(chain, loops, i, j)
-        closes = squared_mahalanobis(left, own + odometry) <= (PAIR_SLACK * max_residual) ** 2
-        agree[i, j] = agree[j, i] = closes | ~joined
+        cycle = cycles(chain, loops, i, j)
+        distances = squared_mahalanobis(cycle.errors, cycle.loops + cycle.odometry)
+        agree[i, j] = agree[j, i] = (distances <= (PAIR_SLACK * max_residual) ** 2) | ~cycle.joined
     return agree
 
 

@@ -19,7 +19,7 @@ INNER_STEPS = 4
 class GraduatedNonConvexity:
     """Weights go from those of a convex problem to 0 and 1.
 
-    GTSAM's own GncLMOptimizer solves each step to convergence and starts with one that trusts every loop; a few
+    GTSAM's own GncLMOptimizer solves each step to convergence and starts with one that accepts every loop; a few
     iterations from the last values find the same loops several times sooner.
     """
 

@@ -1,4 +1,4 @@
-"""Least squares: the optimiser behind every strategy, and the strategy that trusts every loop."""
+"""Least squares: the optimiser behind every strategy, and the strategy that accepts every loop."""
 
 from typing import Self
 

@@ -1,7 +1,7 @@
-"""Which loops can be true at all: what each says of odometry's drift, and which two cannot both be right.
+"""Which loops can be true: the drift that each implies, and pairs that contradict each other.
 
 Least squares counts every loop as evidence of its own. Loops between two rooms that look alike are not: they repeat
-one mistake, agree with one another, and together outweigh odometry, whatever their number says. So before anything
+one mistake, are consistent with one another, and together outweigh odometry however many there are. So before anything
 is optimised a loop must lie within what odometry can have drifted, and loops that put one view at two places are
 withheld unless one side is clearly the better founded.
 """
@@ -36,7 +36,7 @@ BLOCK = 50_000
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Screening:
-    """What odometry says of each loop.
+    """Each loop compared with odometry.
 
     Attributes:
         distances: (L,) Mahalanobis distance from odometry alone (6 degrees of freedom); 0 where odometry does not
@@ -56,10 +56,10 @@ class Screening:
 def screen_loops(chain: OdometryChain, loops: Sequence[Edge], max_residual: float, slack: float) -> Screening:
     """Hold back loops that odometry contradicts, and groups of loops that contradict one another.
 
-    Loops between maps that odometry does not join are let through: there it has nothing to say.
+    Loops between maps that odometry does not join are let through: there is nothing to compare them with.
 
     Args:
-        chain: odometry, widened as far as it is believed to need it.
+        chain: odometry, its covariance widened where it was too small.
         loops: edges that may be false.
         max_residual: Mahalanobis distance that a cycle through two loops may be from closing.
         slack: how many times that a loop may lie from odometry alone.
@@ -70,8 +70,8 @@ def screen_loops(chain: OdometryChain, loops: Sequence[Edge], max_residual: floa
     contradicted = (distances > slack * max_residual) & linear
     reasons: list[RejectionReason | None] = [RejectionReason.INCONSISTENT if no else None for no in contradicted]
     plausible = np.flatnonzero(joined & ~contradicted)
-    doubtful = _ambiguous(chain, [loops[i] for i in plausible.tolist()], distances[plausible], max_residual)
-    for index in plausible[doubtful]:
+    ambiguous = _ambiguous(chain, [loops[i] for i in plausible.tolist()], distances[plausible], max_residual)
+    for index in plausible[ambiguous]:
         reasons[index] = RejectionReason.AMBIGUOUS
     return Screening(distances, tuple(reasons))
 
@@ -114,7 +114,7 @@ def _ambiguous(chain: OdometryChain, loops: Sequence[Edge], distances: FloatArra
         stands = [_outweighs(size[m], typical[m], size[o], typical[o]) for m, o in ((g, h), (h, g))]
         for mine, its in zip((g, h), stands, strict=True):
             withheld[group == mine] |= not its
-        # Where one side stands, a contradiction that rests on a loop or two says nothing of other places.
+        # Where one side stands, a contradiction that rests on a loop or two is no evidence against other places.
         if not (any(stands) and min(size[g], size[h]) < CLEARLY):
             withheld |= _third_side(loops, first[shared], second[shared])
     return withheld
@@ -125,15 +125,17 @@ def _openness(chain: OdometryChain, loops: Sequence[Edge], first: IntArray, seco
     off = np.zeros(len(first))
     for begin in range(0, len(first), BLOCK):
         block = slice(begin, begin + BLOCK)
-        left, own, odometry, joined = cycles(chain, loops, first[block], second[block])
-        off[block][joined] = np.sqrt(squared_mahalanobis(left[joined], (own + odometry)[joined]))
+        cycle = cycles(chain, loops, first[block], second[block])
+        joined = cycle.joined
+        covariances = (cycle.loops + cycle.odometry)[joined]
+        off[block][joined] = np.sqrt(squared_mahalanobis(cycle.errors[joined], covariances))
     return off
 
 
 def _third_side(loops: Sequence[Edge], first: IntArray, second: IntArray) -> BoolArray:
     """(L,) loops between the two places at which contradicting pairs of loops put one view.
 
-    Such a loop says that the two are one place; whichever of the pair is right, it is not.
+    Such a loop joins the two places; whichever of the pair is true, it is false.
     """
     ends = np.array([(loop.from_key, loop.to_key) for loop in loops], dtype=np.int64)
     one, two = ends[first], ends[second]

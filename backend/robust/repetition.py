@@ -1,4 +1,4 @@
-"""Loops of one neighbourhood repeat one another's errors: what several of them are worth together."""
+"""Weights of loops between the same neighbouring keyframes, whose errors are correlated."""
 
 from collections.abc import Sequence
 

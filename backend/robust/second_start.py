@@ -26,9 +26,9 @@ def from_chordal_start(
     """The solution as it is, or a better one from a chordal start.
 
     A start is made from the loops that the solution follows. Where these alone cost less from there, the solution is in
-    a local minimum, and what it says of the other loops cannot be believed: the strategy solves the whole problem
+    a local minimum, and its verdicts on the other loops are not reliable: the strategy solves the whole problem
     again, from a start of all loops and from this one. Of solutions that cost as good as the same, that wins which
-    follows most loops. So false loops that were refused have no say, and a solution that is in the minimum of the loops
+    follows most loops. So rejected loops have no influence, and a solution that is in the minimum of the loops
     it follows comes back unchanged.
 
     Args:

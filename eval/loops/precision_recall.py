@@ -20,7 +20,7 @@ MARKERS = ("o", "s", "^", "v", "D", "P", "X")
 
 
 class Scorer(Protocol):
-    """What of a loop detector is scored."""
+    """The part of a loop detector's interface that scoring uses."""
 
     def query(self, view: KeyframeView) -> list[LoopCandidate]:
         """Candidates among the added keyframes."""
@@ -36,7 +36,7 @@ class Contestant:
     Attributes:
         exhaustive: set to name every pair it can (``loops.max_candidates`` above the number of views and
             ``loops.min_score`` 0), for the scores.
-        ordinary: set as it runs in earnest, for the time.
+        ordinary: set as in a run, for the time.
     """
 
     exhaustive: Scorer
@@ -67,7 +67,7 @@ class Curve:
 
 @dataclass(frozen=True, slots=True)
 class DetectorQuality:
-    """How well scores tell true loops from wrong places; None where there is no true pair.
+    """How well scores separate true loops from wrong places; None where there is no true pair.
 
     Attributes:
         detector: registered name.
@@ -174,7 +174,7 @@ def curve_of(scores: FloatArray, truth: LoopTruth) -> Curve:
 
 
 def judge_detector(name: str, answers: DetectorScores, truth: LoopTruth) -> DetectorQuality:
-    """All figures of a detector on a sequence."""
+    """All values of a detector on a sequence."""
     true, false = truth.true_pairs, truth.false_pairs
     curve = curve_of(answers.scores, truth)
     known = bool(true.any())

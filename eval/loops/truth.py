@@ -34,7 +34,7 @@ ANGLE_TOLERANCE = 10.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DepthView:
-    """What of a depth image the overlap needs.
+    """The parts of a depth image that the overlap needs.
 
     Attributes:
         points: (N, 3) float32 sampled points in the camera frame, metres.
@@ -140,7 +140,7 @@ def judge_loops(
         loops: accepted constraints.
         keyframes: keyframe ``i`` has id ``i``.
         truth: ground-truth poses T_world_cam.
-        read_depth: called for the frames of loops whose pose is off, to tell a wrong place from a poor fit.
+        read_depth: called for the frames of loops whose pose is off, to distinguish wrong places from poor poses.
 
     Returns:
         One judgement a loop; None where truth does not cover both frames.

@@ -47,7 +47,7 @@ class PosedFrames:
         read: reads them unchanged.
         poses: (N, 4, 4) true T_world_cam.
         truth: their loop truth, with all pairs known (``min_gap`` 0).
-        min_gap: seconds between the frames of viewpoint pairs and of look-alikes.
+        min_gap: seconds between the frames of viewpoint pairs and of hard negatives.
         variants: how the world was changed for a group; the images are changed where nothing stands here.
     """
 

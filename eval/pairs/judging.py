@@ -1,4 +1,4 @@
-"""Same place or only alike: detectors on pairs of frames (paper, section 4.3, Table 2).
+"""Same place or hard negative: detectors on pairs of frames (paper, section 4.3, Table 2).
 
 The pairs come from ``semslam.eval.pairs.choice`` or ``semslam.eval.pairs.reader``; the threshold always from other
 sequences.
@@ -64,7 +64,7 @@ class ScoredPairs:
 
 @dataclass(frozen=True, slots=True)
 class GroupAccuracy:
-    """Share of a group's pairs that were told rightly, and their number."""
+    """Share of a group's pairs that were classified correctly, and their number."""
 
     accuracy: float
     pairs: int

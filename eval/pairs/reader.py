@@ -65,6 +65,6 @@ def _load(files: list[tuple[Path, Path | None]], camera: CameraSetup, side: int)
     depth = np.zeros(color.shape[:2], np.float32)
     if depth_file is not None:
         if camera.depth_scale is None:
-            raise DatasetError(f"The camera file beside {color_file.name} must say depth_scale, as there is depth.")
+            raise DatasetError(f"The camera file beside {color_file.name} must state depth_scale, as there is depth.")
         depth = read_depth(depth_file, DepthScale(camera.depth_scale, camera.depth_scale), size)
     return Frame(side, float(side), color, depth, camera.intrinsics)

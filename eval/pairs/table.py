@@ -1,4 +1,4 @@
-"""The pair test in detail: every pair with its score, and the shares told rightly by kind of change."""
+"""The pair test in detail: every pair with its score, and the accuracy by kind of change."""
 
 import csv
 import io
@@ -19,11 +19,11 @@ Thresholds = Mapping[str, Sequence[float]]
 
 @dataclass(frozen=True, slots=True)
 class KindAccuracy:
-    """A kind of change: how many pairs have it, and the share that each detector told rightly."""
+    """A kind of change: how many pairs have it, and the share that each detector classified correctly."""
 
     kind: str
     pairs: int
-    told: dict[str, float]
+    correct: dict[str, float]
 
 
 def pair_rows(tested: Sequence[ScoredPairs], thresholds: Thresholds) -> str:
@@ -42,25 +42,25 @@ def pair_rows(tested: Sequence[ScoredPairs], thresholds: Thresholds) -> str:
 
 
 def kind_rows(kinds: Sequence[KindAccuracy]) -> str:
-    """A CSV with a row for each kind of change and a column for each detector's share told rightly."""
+    """A CSV with a row for each kind of change and a column for each detector's accuracy."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(("kind", "pairs", *(kinds[0].told if kinds else ())))
+    writer.writerow(("kind", "pairs", *(kinds[0].correct if kinds else ())))
     for kind in kinds:
-        writer.writerow((kind.kind, kind.pairs, *(f"{share:.4f}" for share in kind.told.values())))
+        writer.writerow((kind.kind, kind.pairs, *(f"{share:.4f}" for share in kind.correct.values())))
     return text.getvalue()
 
 
-def told_by_kind(tested: Sequence[ScoredPairs], thresholds: Thresholds) -> list[KindAccuracy]:
-    """Shares told rightly by kind of change, those of the same place first; look-alikes of a group are one kind."""
-    told: dict[str, dict[str, list[bool]]] = {}
+def accuracy_by_kind(tested: Sequence[ScoredPairs], thresholds: Thresholds) -> list[KindAccuracy]:
+    """Accuracy by kind of change, those of the same place first; hard negatives of a group are one kind."""
+    correct: dict[str, dict[str, list[bool]]] = {}
     for at, some in enumerate(tested):
         for number, pair in enumerate(some.pairs):
-            right = told.setdefault(_kind(pair), {name: [] for name in thresholds})
+            right = correct.setdefault(_kind(pair), {name: [] for name in thresholds})
             for name, cuts in thresholds.items():
                 right[name].append(bool((some.scores[name][number] >= cuts[at]) == pair.same_place))
     rows = []
-    for kind, right in sorted(told.items(), key=lambda item: _rank(item[0])):
+    for kind, right in sorted(correct.items(), key=lambda item: _rank(item[0])):
         count = len(next(iter(right.values())))
         rows.append(KindAccuracy(kind, count, {name: float(np.mean(hits)) for name, hits in right.items()}))
     return rows
@@ -68,7 +68,7 @@ def told_by_kind(tested: Sequence[ScoredPairs], thresholds: Thresholds) -> list[
 
 def _kind(pair: Pair) -> str:
     if not pair.same_place:
-        return f"look-alikes, {pair.group}"
+        return f"hard negatives, {pair.group}"
     if pair.group is not PairGroup.VIEWPOINT:
         return pair.kind
     motion = invert(pair.poses[0]) @ pair.poses[1]
@@ -78,4 +78,4 @@ def _kind(pair: Pair) -> str:
 
 
 def _rank(kind: str) -> tuple[int, str]:
-    return (2 if kind.startswith("look-alikes") else 0 if kind.startswith("viewpoint") else 1, kind)
+    return (2 if kind.startswith("hard negatives") else 0 if kind.startswith("viewpoint") else 1, kind)

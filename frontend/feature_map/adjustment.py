@@ -32,11 +32,11 @@ class BundleProblem:
         poses: (P, 4, 4) T_map_cam; the first ``free`` of them are adjusted.
         free: how many.
         points: (L, 3) metres.
-        pose_of: (O,) pose of each sighting, ascending.
-        point_of: (O,) point of each sighting; a pose sees a point once.
+        pose_of: (O,) pose of each observation, ascending.
+        point_of: (O,) point of each observation; a pose sees a point once.
         seen: (O,) what was measured.
         camera: the camera.
-        gate: weighted squared residual from which a sighting counts as an outlier.
+        gate: weighted squared residual from which a observation counts as an outlier.
     """
 
     poses: FloatArray
@@ -69,11 +69,11 @@ class BundleAdjustment:
         return gated_errors(self._residual, self._problem.seen.weights, self._camera_points[2])
 
     def outliers(self) -> npt.NDArray[np.bool_]:
-        """Sightings (O,) beyond the gate."""
+        """Observations (O,) beyond the gate."""
         return self.squared_errors() > self._problem.gate
 
     def drop_outliers(self) -> None:
-        """Leave out the sightings that are beyond the gate now from the steps that follow."""
+        """Leave out the observations that are beyond the gate now from the steps that follow."""
         self._active = ~self.outliers()
         self._cost = self._robust_cost(self._camera_points, self._residual)
 

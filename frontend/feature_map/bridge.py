@@ -1,4 +1,4 @@
-"""What carries a tracker over frames that do not meet its map."""
+"""Registration of frames that do not match the tracker's map to the frame before."""
 
 from typing import Protocol
 
@@ -14,11 +14,11 @@ class Bridge(Protocol):
         """Remember a frame as the one before the next."""
 
     def register(self, frame: Frame, T_prev_cur: FloatArray) -> Registration | None:
-        """Motion since the noted frame from a first guess, or None where the two do not meet."""
+        """Motion since the noted frame from an initial guess, or None where the two do not match."""
 
 
 class NoBridge:
-    """Carries over nothing."""
+    """Registers nothing."""
 
     def note(self, frame: Frame) -> None:
         """Remember nothing."""

@@ -1,4 +1,4 @@
-"""Matching landmarks to keypoints where a predicted pose says they should be."""
+"""Matching landmarks to keypoints where a predicted pose expects them."""
 
 from dataclasses import dataclass
 
@@ -16,7 +16,7 @@ RATIO = 0.85
 FARTHER = 512
 """More bits than descriptors have."""
 MIN_COSINE = 0.5
-"""Cosine of the angle between a landmark's first view and this one; beyond it, the patch looks different."""
+"""Cosine of the angle between a landmark's first view and this one; beyond it, descriptors are not comparable."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

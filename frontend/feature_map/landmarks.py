@@ -1,4 +1,4 @@
-"""Points of the map: where they are, how they look, and how often they were met again."""
+"""Points of the map: positions, descriptors, and how often they were observed."""
 
 import numpy as np
 import numpy.typing as npt
@@ -8,11 +8,11 @@ from semslam.types import FloatArray, IntArray, UInt8Array
 NONE = -1
 """In place of a landmark's identity: a keypoint that belongs to none."""
 OBSERVERS = 32
-"""Keyframes that a landmark remembers to have been seen from: the latest, so that no search grows with the map."""
+"""How many of the latest keyframes that observe it a landmark stores, so that no search grows with the map."""
 
 
 _COLUMNS = (
-    "positions", "descriptors", "directions", "reach", "born", "visible", "found", "alive", "sightings", "observers",
+    "positions", "descriptors", "directions", "reach", "born", "visible", "found", "alive", "observations", "observers",
 )  # fmt: skip
 
 
@@ -41,7 +41,7 @@ class Landmarks:
         self._visible = np.zeros(1024, dtype=np.int64)
         self._found = np.zeros(1024, dtype=np.int64)
         self._alive = np.zeros(1024, dtype=bool)
-        self._sightings = np.zeros(1024, dtype=np.int64)
+        self._observations = np.zeros(1024, dtype=np.int64)
         self._observers = np.full((1024, OBSERVERS), NONE, dtype=np.int32)
 
     def __len__(self) -> int:
@@ -94,8 +94,8 @@ class Landmarks:
 
     def note(self, landmarks: IntArray, keyframe: int) -> None:
         """Remember that a keyframe sees some landmarks."""
-        self._observers[landmarks, self._sightings[landmarks] % OBSERVERS] = keyframe
-        self._sightings[landmarks] += 1
+        self._observers[landmarks, self._observations[landmarks] % OBSERVERS] = keyframe
+        self._observations[landmarks] += 1
 
     def add(
         self,
@@ -116,7 +116,7 @@ class Landmarks:
         self._born[rows] = keyframe
         self._visible[rows] = self._found[rows] = 1
         self._alive[rows] = True
-        self._sightings[rows] = 0
+        self._observations[rows] = 0
         self._observers[rows] = NONE
         return np.arange(first, self._count)
 

@@ -30,7 +30,7 @@ class MapKeyframe:
 
 
 class LocalMap:
-    """Keyframes and landmarks with their sightings.
+    """Keyframes and landmarks with their observations.
 
     Args:
         capacity: keypoints that a frame may have.
@@ -41,7 +41,7 @@ class LocalMap:
         self.keyframes: list[MapKeyframe] = []
         self.landmarks = Landmarks()
         self._scale = scale
-        self._sightings = np.full((16, capacity), NONE, dtype=np.int64)
+        self._observations = np.full((16, capacity), NONE, dtype=np.int64)
         self._maps = np.zeros(16, dtype=np.int64)
 
     @property
@@ -49,20 +49,20 @@ class LocalMap:
         """A map id that has not been used."""
         return int(self._maps[: len(self.keyframes)].max(initial=0)) + 1
 
-    def sightings(self, keyframe: int) -> IntArray:
+    def observations(self, keyframe: int) -> IntArray:
         """Landmark of each keypoint (N,) of a keyframe, NONE where there is none; may be written."""
-        return self._sightings[keyframe, : len(self.keyframes[keyframe].features)]
+        return self._observations[keyframe, : len(self.keyframes[keyframe].features)]
 
     def add_keyframe(
-        self, T_map_cam: FloatArray, features: Features, measured: Measurements, sightings: IntArray, map_id: int
+        self, T_map_cam: FloatArray, features: Features, measured: Measurements, observations: IntArray, map_id: int
     ) -> MapKeyframe:
         """Add a keyframe with the landmarks (N,) its keypoints were matched to."""
         keyframe = MapKeyframe(len(self.keyframes), T_map_cam, features, measured, map_id)
-        if keyframe.id == len(self._sightings):
-            self._sightings = np.concatenate([self._sightings, np.full_like(self._sightings, NONE)])
+        if keyframe.id == len(self._observations):
+            self._observations = np.concatenate([self._observations, np.full_like(self._observations, NONE)])
             self._maps = np.concatenate([self._maps, np.zeros_like(self._maps)])
-        self._sightings[keyframe.id, : len(sightings)] = sightings
-        self.landmarks.note(sightings[sightings != NONE], keyframe.id)
+        self._observations[keyframe.id, : len(observations)] = observations
+        self.landmarks.note(observations[observations != NONE], keyframe.id)
         self._maps[keyframe.id] = map_id
         self.keyframes.append(keyframe)
         return keyframe
@@ -80,7 +80,7 @@ class LocalMap:
             distances * self._scale ** features.octaves[rows].astype(np.float64),
             keyframe.id,
         )
-        self.sightings(keyframe.id)[rows] = ids
+        self.observations(keyframe.id)[rows] = ids
         self.landmarks.note(ids, keyframe.id)
         return ids
 
@@ -105,7 +105,7 @@ class LocalMap:
     def seen_from(self, keyframes: IntArray) -> IntArray:
         """Identities of the living landmarks that some keyframes see, ascending."""
         seen = np.zeros(len(self.landmarks) + 1, dtype=bool)
-        seen[self._sightings[keyframes]] = True
+        seen[self._observations[keyframes]] = True
         return np.flatnonzero(seen[:-1] & self.landmarks.alive)
 
     def remove(self, landmarks: IntArray, keyframes: IntArray) -> None:
@@ -113,11 +113,11 @@ class LocalMap:
         self.landmarks.alive[landmarks] = False
         dead = np.zeros(len(self.landmarks) + 1, dtype=bool)
         dead[landmarks] = True
-        rows = self._sightings[keyframes]
+        rows = self._observations[keyframes]
         rows[dead[rows]] = NONE
-        self._sightings[keyframes] = rows
+        self._observations[keyframes] = rows
 
-    def sighting_counts(self, keyframes: IntArray) -> IntArray:
+    def observation_counts(self, keyframes: IntArray) -> IntArray:
         """How many of some keyframes see each landmark (M,)."""
-        rows = self._sightings[keyframes]
+        rows = self._observations[keyframes]
         return np.bincount(rows[rows != NONE], minlength=len(self.landmarks))

@@ -13,7 +13,7 @@ GATE = 7.815
 
 @dataclass(frozen=True, slots=True, eq=False)
 class View:
-    """A frame as the tracker looks at it.
+    """A frame with what the tracker needs of it.
 
     Attributes:
         timestamp: seconds.
@@ -63,11 +63,11 @@ def locate(
     Args:
         the_map: the map.
         view: the frame.
-        T_map_cam: (4, 4) first guess.
+        T_map_cam: (4, 4) initial guess.
         wanted: identities of the landmarks to look for.
         radii: pixels, in the order they are used.
         scale: factor between pyramid levels.
-        least: inliers below which a pose is not believed.
+        least: inliers below which a pose is rejected.
     """
     found: tuple[Matches, PoseEstimate] | None = None
     for radius in radii:

@@ -12,7 +12,7 @@ from semslam.geometry.se3 import invert, transform_points
 from semslam.types import FloatArray, IntArray
 
 YOUNG = 3
-"""Keyframes within which a new landmark must have been met again."""
+"""Keyframes within which a new landmark must have been observed again."""
 
 
 class Mapper:
@@ -28,14 +28,14 @@ class Mapper:
     ) -> MapKeyframe:
         """Make a keyframe of a frame whose keypoints were matched to landmarks; new landmarks come from the rest."""
         self.finish()
-        sightings = np.full(len(view.features), NONE, dtype=np.int64)
-        sightings[keypoints] = landmarks
-        keyframe = self._map.add_keyframe(T_map_cam, view.features, view.measured, sightings, map_id)
+        observations = np.full(len(view.features), NONE, dtype=np.int64)
+        observations[keypoints] = landmarks
+        keyframe = self._map.add_keyframe(T_map_cam, view.features, view.measured, observations, map_id)
         depths = view.features.depths
-        fresh = np.flatnonzero((sightings == NONE) & (depths > 0) & (depths < self._config.max_depth))
+        fresh = np.flatnonzero((observations == NONE) & (depths > 0) & (depths < self._config.max_depth))
         self._map.add_landmarks(keyframe, fresh)
         self._cull(keyframe)
-        window = self._map.covisible(self._map.sightings(keyframe.id), map_id, self._config.min_shared)
+        window = self._map.covisible(self._map.observations(keyframe.id), map_id, self._config.min_shared)
         if len(window) > 1:
             self._running = _WindowAdjustment(self._map, window, view, self._config)
         return keyframe
@@ -51,12 +51,12 @@ class Mapper:
             self.proceed()
 
     def _cull(self, newest: MapKeyframe) -> None:
-        """Drop landmarks that were hardly met again, or not by another keyframe in the first few."""
+        """Drop landmarks that were rarely observed again, or not by another keyframe in the first few."""
         marks = self._map.landmarks
         recent = np.arange(max(newest.id - YOUNG, 0), newest.id + 1)
         young = (marks.born >= newest.id - YOUNG) & (marks.born < newest.id) & marks.alive
         rare = young & (marks.found < self._config.min_found * marks.visible)
-        lonely = marks.alive & (marks.born == newest.id - YOUNG) & (self._map.sighting_counts(recent) < 2)
+        lonely = marks.alive & (marks.born == newest.id - YOUNG) & (self._map.observation_counts(recent) < 2)
         self._map.remove(np.flatnonzero(rare | lonely), recent)
 
 
@@ -77,7 +77,7 @@ class _WindowAdjustment:
             free, fixed = free[~oldest], free[oldest]
         self._free = free
         self._keyframes = np.concatenate([free, fixed])
-        views = the_map.sighting_counts(self._keyframes)[landmarks]
+        views = the_map.observation_counts(self._keyframes)[landmarks]
         self._landmarks, self._alone = landmarks[views > 1], landmarks[views == 1]
         self._adjustment = BundleAdjustment(self._problem(view, len(free)))
 
@@ -86,7 +86,7 @@ class _WindowAdjustment:
         index[self._landmarks] = np.arange(len(self._landmarks))
         pose_of, point_of, keypoints, measured = [], [], [], []
         for k, keyframe in enumerate(self._keyframes):
-            point = index[self._map.sightings(keyframe)]
+            point = index[self._map.observations(keyframe)]
             rows = np.flatnonzero(point != NONE)
             pose_of.append(np.full(len(rows), k))
             point_of.append(point[rows])
@@ -124,8 +124,8 @@ class _WindowAdjustment:
         alone = np.zeros(len(self._map.landmarks) + 1, dtype=bool)
         alone[self._alone] = True
         for k, keyframe in enumerate(self._free):
-            sightings = self._map.sightings(keyframe)
-            mine = sightings[alone[sightings]]
+            observations = self._map.observations(keyframe)
+            mine = observations[alone[observations]]
             T_new_old = self._adjustment.poses[k] @ invert(self._map.keyframes[keyframe].T_map_cam)
             positions[mine] = transform_points(T_new_old, positions[mine])
             self._map.keyframes[keyframe].T_map_cam = self._adjustment.poses[k]
@@ -133,4 +133,4 @@ class _WindowAdjustment:
         wrong = self._adjustment.outliers()
         for k, keyframe in enumerate(self._keyframes):
             rows = self._keypoint_of[wrong & (self._pose_of == k)]
-            self._map.sightings(keyframe)[rows] = NONE
+            self._map.observations(keyframe)[rows] = NONE

@@ -64,7 +64,7 @@ class FeatureMapOdometry:
 
     @property
     def readout_seconds(self) -> float:
-        """The read-out time of the rolling shutter as believed now, seconds."""
+        """The current estimate of the rolling shutter's read-out time, seconds."""
         return self._readout.seconds
 
     def track(self, frame: Frame) -> Motion:
@@ -140,7 +140,7 @@ class FeatureMapOdometry:
         return self._locate(view, place.T_map_cam, self._map.seen_from(place.keyframes), radius)
 
     def _around(self, landmarks: IntArray) -> IntArray:
-        """Identities of the landmarks that keyframes see which share some with these."""
+        """Identities of the landmarks observed by keyframes that share some with these."""
         keyframes = self._map.covisible(landmarks, self._map_id)[: self._config.local_keyframes]
         return self._map.seen_from(keyframes)
 
@@ -178,7 +178,7 @@ class FeatureMapOdometry:
         )
 
     def _cross(self, frame: Frame, view: View, T_map_prev: FloatArray) -> Motion:
-        """Where the map is not met, go on by another kind of registration, if there is one and it succeeds."""
+        """Where the frame does not match the map, use another kind of registration, if there is one and it succeeds."""
         found = None
         if self._lost_since is None and self._reference is not None:
             found = self._bridge.register(frame, self._prediction.predict(frame.timestamp))
@@ -194,7 +194,7 @@ class FeatureMapOdometry:
         return Motion(T_prev_cur, found.covariance, TrackingStatus.DEGRADED, self._map_id, found.inliers)
 
     def _lose(self, view: View) -> Motion:
-        """Predict; and where good images have not met the map for a while, start a new one."""
+        """Predict; and where good images have not matched the map for a while, start a new one."""
         self._lost_since = view.timestamp if self._lost_since is None else self._lost_since
         usable = np.count_nonzero(view.features.depths) >= self._config.min_landmarks
         self._usable_since = (self._usable_since or view.timestamp) if usable else None
@@ -231,5 +231,5 @@ class FeatureMapOdometry:
         self._reference = self._mapper.insert(view, T_map_cam, landmarks, keypoints, self._map_id)
         self._T_ref_prev = np.eye(4)
         self._keyframe_time = view.timestamp
-        sightings = self._map.sightings(self._reference.id)
-        self._tracked = sightings[sightings != NONE].astype(np.int64)
+        observations = self._map.observations(self._reference.id)
+        self._tracked = observations[observations != NONE].astype(np.int64)

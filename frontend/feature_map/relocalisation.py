@@ -40,7 +40,7 @@ def relocalise(the_map: LocalMap, view: View, least: int, seed: int) -> Place | 
     """
     for keyframe in _retrieve(the_map, view):
         map_id = the_map.keyframes[keyframe].map_id
-        around = the_map.covisible(the_map.sightings(keyframe), map_id)[:NEIGHBOURS]
+        around = the_map.covisible(the_map.observations(keyframe), map_id)[:NEIGHBOURS]
         T_map_cam = match_and_solve(the_map, view, the_map.seen_from(around), least, seed)
         if T_map_cam is not None:
             return Place(T_map_cam, map_id, around)
@@ -61,7 +61,7 @@ def match_and_solve(the_map: LocalMap, view: View, landmarks: IntArray, least: i
 
 
 def _retrieve(the_map: LocalMap, view: View) -> list[int]:
-    """Keyframes that see most of the landmarks that look like the frame's keypoints."""
+    """Keyframes that observe most of the landmarks whose descriptors match the frame's keypoints."""
     marks = the_map.landmarks
     known = np.flatnonzero(marks.alive & (marks.found > 1))
     descriptors = view.features.descriptors[:: max(len(view.features) // SAMPLE, 1)]

@@ -16,12 +16,12 @@ from semslam.types import Features, FloatArray, Intrinsics
 FASTEST = 0.04
 """Seconds; no read-out is longer than a frame at 25 Hz."""
 USUAL = 0.026
-"""Seconds; a Kinect's, where the camera does not say."""
+"""Seconds; a Kinect's, where the camera states none."""
 FORGET = 0.97
-"""What a frame's say in the estimate keeps at the next frame."""
+"""Factor by which a frame's information in the estimate decays at each further frame."""
 
 TRUST = 1e-2
-"""Landmarks were themselves made with the read-out believed so far, so that a frame says less than its residuals."""
+"""Factor on a frame's information: landmarks were themselves made with the estimated read-out, which hides errors."""
 
 
 def velocity_of(T_prev_cur: FloatArray, seconds: float) -> FloatArray:
@@ -60,8 +60,8 @@ class ReadoutEstimate:
     """The read-out time, from how residuals grow with a row's delay and the camera's velocity.
 
     Args:
-        seconds: what is believed before; 0 = all rows at once, which is not doubted; None = not known.
-        sigma: how far that may be off, seconds; 0 = not at all.
+        seconds: the prior; 0 = all rows at once, which is not estimated; None = not known.
+        sigma: standard deviation of the prior, seconds; 0 = exact.
     """
 
     def __init__(self, seconds: float | None, sigma: float) -> None:
@@ -107,7 +107,7 @@ class ReadoutEstimate:
         residual = project_stereo(points, camera) - rectified.stereo
         J = J.reshape(6, -1)
         JW = J * weights.reshape(-1)
-        # The pose has taken up what it could of the effect: only what is left of the slope speaks.
+        # The pose has taken up what it could of the effect: only what is left of the slope is evidence.
         left = slope.reshape(-1) - np.linalg.solve(JW @ J.T + 1e-9 * np.eye(6), JW @ slope.reshape(-1)) @ J
         weighted = left * weights.reshape(-1)
         information = float(weighted @ left) * TRUST

@@ -72,7 +72,7 @@ class DenseRegistrar:
         return DenseView(rgbd, frame.intrinsics)
 
     def register(self, reference: DenseView, current: DenseView, T_ref_cam: FloatArray) -> Registration | None:
-        """Register ``current`` to ``reference`` from a first guess; None where too few pixels agree."""
+        """Register ``current`` to ``reference`` from an initial guess; None where too few pixels agree."""
         import open3d as o3d
 
         odometry = o3d.t.pipelines.odometry
@@ -96,9 +96,9 @@ class DenseRegistrar:
         if np.linalg.cond(information) > 1e12:
             return None
         # Open3D moves the reference's points; the covariance belongs to the camera's side.
-        carry = adjoint(invert(T))
+        Ad = adjoint(invert(T))
         variance = self._config.sigma**2
-        covariance = carry @ np.linalg.inv(information) @ carry.T * variance
+        covariance = Ad @ np.linalg.inv(information) @ Ad.T * variance
         inliers = round(found.fitness * current.intrinsics.width * current.intrinsics.height)
         return Registration(T, covariance, inliers, found.fitness < 2 * self._config.min_fitness)
 
@@ -106,7 +106,7 @@ class DenseRegistrar:
 class DenseOdometry(ReferenceOdometry[DenseView]):
     """Registers each frame to the one before by colour and depth (Park et al., ICCV 2017). Drifts: it has no map.
 
-    LOST where there is no depth or the images do not meet.
+    LOST where there is no depth or the images do not match.
     """
 
     name = "dense"

@@ -35,7 +35,7 @@ class _Registrar:
 class DenseKeyframeOdometry(ReferenceOdometry[_View]):
     """Registers frames to a keyframe by colour and depth, so that errors add up by keyframes and not by frames.
 
-    LOST where there is no depth or the images do not meet.
+    LOST where there is no depth or the images do not match.
     """
 
     name = "dense_keyframe"

@@ -10,7 +10,7 @@ from semslam.geometry.se3 import invert, rotation_angle
 from semslam.types import FloatArray, Frame, Motion, TrackingStatus
 
 RESTART_SECONDS = 0.5
-"""A usable image that does not meet the reference for this long becomes the reference of a new map."""
+"""Seconds without a match after which a usable image becomes the reference of a new map."""
 
 ViewT = TypeVar("ViewT")
 
@@ -22,7 +22,7 @@ class Registration:
     Attributes:
         T_ref_cam: (4, 4) pose in the reference camera.
         covariance: (6, 6) of T_ref_cam.
-        inliers: matches or points that agree.
+        inliers: matches or points that support the pose.
         degraded: whether the pose is only just supported.
     """
 
@@ -39,7 +39,7 @@ class Registrar(Protocol[ViewT]):
         """What is needed of a frame to be tracked, or None where it holds too little."""
 
     def register(self, reference: ViewT, current: ViewT, T_ref_cam: FloatArray) -> Registration | None:
-        """Register ``current`` to ``reference`` from a first guess, or None where they do not meet."""
+        """Register ``current`` to ``reference`` from an initial guess, or None where they do not match."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""Where a query may stand, by features or by semantic nodes, and which features agree once one knows where to look."""
+"""Initial guesses of the query's pose, from features or from semantic nodes, refined by guided matching."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from semslam.types import IntArray, Keyframe, NodePair
 WIDE, NARROW = 15.0, 8.0
 """Pixels around a predicted place in which a match is looked for, at first and once the pose is nearly known."""
 ALIKE = 64
-"""Bits by which descriptors of one place may differ at the most, of 256."""
+"""Maximum Hamming distance of matching descriptors, of 256 bits."""
 MIN_PAIRS = 6
 NODE_DISTANCE = 0.3
 """Metres by which matched nodes may miss one another: centroids of masks move with the view."""
@@ -61,7 +61,7 @@ class FeaturePair:
         self._alike = np.nonzero(self._distances <= ALIKE)
 
     def matches(self, ratio: float) -> IntArray:
-        """Pairs (K, 2) of query keypoints and matched points that look alike, wherever they are."""
+        """Pairs (K, 2) of query keypoints and matched points with similar descriptors, wherever they are."""
         if not self._distances.size:
             return np.zeros((0, 2), dtype=np.int64)
         return mutual_matches(self._distances, ratio)
@@ -96,7 +96,7 @@ class FeaturePair:
         return np.sqrt(squared_errors(T_match_query, self._points[matches[:, 1]], seen, self._camera))
 
     def _guided(self, T_match_query: FloatArray, radius: float) -> IntArray:
-        """Pairs that are each other's most alike among those no farther than ``radius`` in u and v."""
+        """Pairs that are each other's nearest in descriptor among those no farther than ``radius`` in u and v."""
         points = transform_points(invert(T_match_query), self._points)
         ahead = points[:, 2] > NEAREST
         predicted = np.full((len(points), 2), np.inf, dtype=np.float32)
@@ -120,7 +120,7 @@ def _nearest(owners: IntArray, distances: npt.NDArray[np.int16]) -> npt.NDArray[
 
 
 def pose_from_nodes(nodes: Iterable[NodePair], query: Intrinsics, match: Intrinsics) -> tuple[FloatArray, int] | None:
-    """Rigid transform that most matched semantic nodes agree on, each triple tried (RANSAC without the chance).
+    """Rigid transform that most matched semantic nodes agree on, each triple tried (RANSAC without random samples).
 
     Args:
         nodes: matched nodes; those without depth are left out.

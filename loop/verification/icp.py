@@ -1,5 +1,6 @@
 """From a candidate to a constraint: a pose from features, refined on the clouds, behind gates."""
 
+from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
@@ -20,22 +21,49 @@ from semslam.types import (
 )
 
 FITNESS_SLACK = 0.95
-"""Share of the first guess's fitness that ICP's pose must keep: the loss may trade some points for a better fit."""
+"""Share of the initial guess's fitness that ICP's pose must keep: the loss may trade some points for a better fit."""
 ROTATION_GROWTH, TRANSLATION_GROWTH = 0.5, 1.5
 """Powers of the overlap that errors grow with as it falls, fitted to ground truth on two real sequences."""
 MIN_SEEN = 0.05
 """Overlap below which they grow no more; the gates refuse such loops."""
 
 
-class IcpVerifier:
-    """A first guess from features and one from semantic nodes, ICP, and gates that test what comes out.
+@dataclass(frozen=True, slots=True, eq=False)
+class _Estimate:
+    """A refined relative pose, and what the gates test of it.
 
-    PnP RANSAC on feature matches, and the rigid motion of matched semantic nodes, each say where the query may stand.
-    From there features are matched anew near where they are predicted, also after ICP; the guess that most features
-    agree on is kept. ICP on the keyframes' clouds then refines it, unless its pose fits the clouds worse or moves the
-    agreeing features far, as where a view holds one plane. A constraint needs enough agreeing features, fitness, a
-    small residual, overlap seen from both sides, no points in space that the other view looked through, and a
-    position that is determined.
+    Attributes:
+        T_match_query: (4, 4).
+        covariance: (6, 6) of it.
+        fit: the query's cloud on the match's.
+        overlap: the smaller share of either cloud that lies near the other, 0..1.
+    """
+
+    T_match_query: FloatArray
+    covariance: FloatArray
+    fit: Fit
+    overlap: float
+
+
+@dataclass(frozen=True, slots=True)
+class _Gate:
+    """A test of an estimate: whether it passed, and the reason, value and limit of a rejection."""
+
+    passed: bool
+    reason: RejectionReason
+    value: float
+    limit: float
+
+
+class IcpVerifier:
+    """Initial guesses from features and from semantic nodes, ICP, and gates that test the result.
+
+    PnP RANSAC on feature matches, and the rigid motion of matched semantic nodes, each give an initial guess of the
+    query's pose. From there features are matched anew near where they are predicted, also after ICP; the guess that
+    most features agree on is kept. ICP on the keyframes' clouds then refines it, unless its pose fits the clouds worse
+    or moves the agreeing features far, as where a view holds one plane. A constraint needs enough agreeing features,
+    fitness, a small residual, overlap seen from both sides, no points in space that the other view looked through, and
+    a position that is determined.
     """
 
     name = "icp"
@@ -50,7 +78,7 @@ class IcpVerifier:
         return cls(config.verification, config.seed)
 
     def verify(self, query: Keyframe, match: Keyframe, candidate: LoopCandidate) -> LoopConstraint | LoopRejection:
-        """See ``LoopVerifier``; the reason, figure and limit of a rejection are those of the first gate that closed."""
+        """See ``LoopVerifier``; the reason, value and limit of a rejection are those of the first gate that failed."""
         pair = FeaturePair(query, match, self._config.max_reprojection)
         matches = pair.matches(self._config.match_ratio)
         guess, figures = self._best_guess(query, match, candidate, pair, matches)
@@ -65,8 +93,10 @@ class IcpVerifier:
         T_match_query, fit, method = self._refine(query, match, pair, guess)
         overlap = self._overlap(query, match, T_match_query)
         covariance = self._covariance(query, match, guess, T_match_query, fit, method, overlap)
-        refusal = self._gate(query, match, candidate, T_match_query, fit, overlap, covariance)
-        return refusal or LoopConstraint(
+        for gate in self._gates(query, match, _Estimate(T_match_query, covariance, fit, overlap)):
+            if not gate.passed:
+                return LoopRejection(candidate, gate.reason, gate.value, gate.limit)
+        return LoopConstraint(
             candidate, T_match_query, covariance, fit.fitness, fit.rmse, overlap, found, method, figures,
             shared=pair.rows(guess.matches),
         )  # fmt: skip
@@ -131,27 +161,20 @@ class IcpVerifier:
         back = measure_fit(match.cloud, query.cloud, invert(T_match_query), distance)
         return min(there.fitness, back.fitness)
 
-    def _gate(
-        self, query: Keyframe, match: Keyframe, candidate: LoopCandidate, T_match_query: FloatArray, fit: Fit,
-        overlap: float, covariance: FloatArray,
-    ) -> LoopRejection | None:  # fmt: skip
-        config = self._config
+    def _gates(self, query: Keyframe, match: Keyframe, estimate: _Estimate) -> tuple[_Gate, ...]:
+        config, fit, overlap = self._config, estimate.fit, estimate.overlap
         filled = max(
-            free_space_violation(query.cloud, match.cloud, match.intrinsics, T_match_query),
-            free_space_violation(match.cloud, query.cloud, query.intrinsics, invert(T_match_query)),
+            free_space_violation(query.cloud, match.cloud, match.intrinsics, estimate.T_match_query),
+            free_space_violation(match.cloud, query.cloud, query.intrinsics, invert(estimate.T_match_query)),
         )
-        sigma = float(np.sqrt(np.linalg.eigvalsh(covariance[3:, 3:])[-1]))
-        gates = (
-            (fit.fitness >= config.min_fitness, RejectionReason.LOW_FITNESS, fit.fitness, config.min_fitness),
-            (fit.rmse <= config.max_rmse, RejectionReason.HIGH_RMSE, fit.rmse, config.max_rmse),
-            (overlap >= config.min_overlap, RejectionReason.LOW_OVERLAP, overlap, config.min_overlap),
-            (filled <= config.max_free_space, RejectionReason.FREE_SPACE, filled, config.max_free_space),
-            (sigma <= config.max_sigma, RejectionReason.DEGENERATE, sigma, config.max_sigma),
+        sigma = float(np.sqrt(np.linalg.eigvalsh(estimate.covariance[3:, 3:])[-1]))
+        return (
+            _Gate(fit.fitness >= config.min_fitness, RejectionReason.LOW_FITNESS, fit.fitness, config.min_fitness),
+            _Gate(fit.rmse <= config.max_rmse, RejectionReason.HIGH_RMSE, fit.rmse, config.max_rmse),
+            _Gate(overlap >= config.min_overlap, RejectionReason.LOW_OVERLAP, overlap, config.min_overlap),
+            _Gate(filled <= config.max_free_space, RejectionReason.FREE_SPACE, filled, config.max_free_space),
+            _Gate(sigma <= config.max_sigma, RejectionReason.DEGENERATE, sigma, config.max_sigma),
         )
-        for passed, reason, figure, limit in gates:
-            if not passed:
-                return LoopRejection(candidate, reason, figure, limit)
-        return None
 
 
 def _count(guess: Guess | None) -> int:

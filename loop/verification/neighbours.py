@@ -1,4 +1,4 @@
-"""Features that a keyframe shares with the one before it: the way between the closures, seen again."""
+"""Features that a keyframe shares with the one before it."""
 
 from semslam.config import VerificationConfig
 from semslam.loop.verification.guess import FeaturePair
@@ -8,7 +8,7 @@ from semslam.types import IntArray, Keyframe
 def shared_features(query: Keyframe, match: Keyframe, config: VerificationConfig, seed: int) -> IntArray | None:
     """Rows (K, 2) of both keyframes' ``finest`` features that agree on one pose; None where too few do.
 
-    They are matched as those of a loop candidate are, by PnP RANSAC and a second look, without clouds or nodes.
+    They are matched as those of a loop candidate are, by PnP RANSAC and guided matching, without clouds or nodes.
     """
     pair = FeaturePair(query, match, config.max_reprojection)
     pnp = pair.solve(pair.matches(config.match_ratio), seed)

@@ -48,7 +48,7 @@ def refine(
     Args:
         source: moves.
         target: stays.
-        T_target_source: (4, 4) first guess.
+        T_target_source: (4, 4) initial guess.
         distances: metres, farthest correspondence of each pass; also the loss's width.
         kind: "point_to_plane" (Chen and Medioni, 1992); "generalized" (Segal et al., RSS 2009), plane to plane;
             "colored" (Park et al., ICCV 2017), which also compares colours and needs them in both clouds.

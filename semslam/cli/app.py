@@ -60,7 +60,7 @@ def _show_warning(
 
 
 def main() -> None:
-    """Run the command line; what a user can mend ends in one sentence and exit code 2, Ctrl-C in 130."""
+    """Run the command line; what a user can correct ends in one sentence and exit code 2, Ctrl-C in 130."""
     try:
         with warnings.catch_warnings():
             warnings.showwarning = _show_warning
@@ -72,7 +72,7 @@ def main() -> None:
         complain("Interrupted.")
         sys.exit(INTERRUPTED)
     except BrokenPipeError:
-        # The reader of a pipe has gone; say nothing more, not even while Python closes standard output.
+        # The reader of a pipe has gone; print nothing more, not even while Python closes standard output.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(128 + signal.SIGPIPE)
     except OSError as error:

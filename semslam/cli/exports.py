@@ -104,7 +104,7 @@ def _write_images(run: "SavedRun", target: Target, directory: Path, sequence: st
 
     source = sequence or read_source(run.directory)
     if source is None:
-        raise ConfigError("The run does not tell where its images are; name the sequence with --sequence.")
+        raise ConfigError("The run does not state where its images are; name the sequence with --sequence.")
     dataset = open_dataset(source, run.config.dataset)
     with writing(directory):
         if directory.exists() and any(directory.iterdir()):

@@ -69,7 +69,7 @@ ConfigFile = Annotated[Path | None, typer.Option("--config", help="YAML settings
 Settings = Annotated[list[str] | None, typer.Option("--set", help="A setting, section.key=value; may be repeated.")]
 Seed = Annotated[int | None, typer.Option("--seed", min=0, max=2**31 - 1, help="Seed of everything random.")]
 Start = Annotated[int, typer.Option("--start", min=0, max=MOST, help="First frame.")]
-MaxFrames = Annotated[int | None, typer.Option("--max-frames", min=1, max=MOST, help="Frames at the most.")]
+MaxFrames = Annotated[int | None, typer.Option("--max-frames", min=1, max=MOST, help="Maximum number of frames.")]
 Stride = Annotated[int, typer.Option("--stride", min=1, max=MOST, help="Take every n-th frame.")]
 Plots = Annotated[bool, typer.Option("--plots/--no-plots", help="Draw plots and the report.")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON on standard output.")]

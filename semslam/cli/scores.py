@@ -99,8 +99,8 @@ def loops_command(
     for heading in ("AP", "recall at 100 %", "recall at 99 %", "max F1", "recall@1", "ms"):
         table.add_column(heading, justify="right")
     for q in comparison.qualities:
-        figures = (q.average_precision, q.recall_at_100_precision, q.recall_at_99_precision, q.max_f1, q.recall_at_1)
-        table.add_row(q.detector, *("-" if f is None else f"{f:.3f}" for f in figures), f"{q.ms_per_query:.1f}")
+        values = (q.average_precision, q.recall_at_100_precision, q.recall_at_99_precision, q.max_f1, q.recall_at_1)
+        table.add_row(q.detector, *("-" if f is None else f"{f:.3f}" for f in values), f"{q.ms_per_query:.1f}")
     out.print(table)
     out.print(f"{q.true_pairs} true and {q.false_pairs} false pairs; results: {out_directory}", soft_wrap=True)
 
@@ -120,14 +120,14 @@ def pairs_command(
         int, typer.Option(min=1, max=options.MOST, help="Frames from one that may be chosen to the next.")
     ] = 5,
     count: Annotated[
-        int, typer.Option(min=2, max=options.MOST, help="Pairs of each group and sequence at the most.")
+        int, typer.Option(min=2, max=options.MOST, help="Maximum number of pairs of each group and sequence.")
     ] = 50,
     out_directory: Annotated[Path, typer.Option("--out", help="Folder for the results.")] = Path("pairs"),
     config: options.ConfigFile = None,
     overrides: options.Settings = None,
     seed: options.Seed = None,
 ) -> None:
-    """Tell the same place from look-alikes under changes of viewpoint, light and objects."""
+    """Separate the same place from hard negatives under changes of viewpoint, light and objects."""
     from semslam.runs.files import check_place, writing
     from semslam.studies.detectors import PROBABILISTIC
     from semslam.studies.pairs import PairPlan, try_pairs
@@ -153,23 +153,23 @@ def pairs_command(
 def _write_pairs(trial: "PairTrial", directory: Path) -> None:
     """Write pairs.json, tables of all pairs and of all kinds of change, and a sheet of examples for each set."""
     from semslam.eval.pairs.sheet import draw_sheet
-    from semslam.eval.pairs.table import kind_rows, pair_rows, told_by_kind
+    from semslam.eval.pairs.table import accuracy_by_kind, kind_rows, pair_rows
     from semslam.runs.files import write_json, writing
 
     write_json(directory / "pairs.json", {"detectors": [asdict(quality) for quality in trial.qualities]})
     with writing(directory):
         (directory / "pairs.csv").write_text(pair_rows(trial.tested, trial.thresholds), encoding="utf-8")
-        kinds = told_by_kind(trial.tested, trial.thresholds)
+        kinds = accuracy_by_kind(trial.tested, trial.thresholds)
         (directory / "kinds.csv").write_text(kind_rows(kinds), encoding="utf-8")
         for number, some in enumerate(trial.tested, start=1):
             (directory / f"pairs-{number}.png").write_bytes(draw_sheet(some.pairs, some.name))
 
 
 def _print_pairs(trial: "PairTrial") -> None:
-    from semslam.eval.pairs.table import told_by_kind
+    from semslam.eval.pairs.table import accuracy_by_kind
 
     sizes = ", ".join(f"{some.name} ({len(some.pairs)})" for some in trial.tested)
-    table = Table(title=f"Share of pairs told rightly: {sizes}", title_justify="left")
+    table = Table(title=f"Share of pairs classified correctly: {sizes}", title_justify="left")
     for heading in ("detector", *GROUPS):
         table.add_column(heading, justify="left" if heading == "detector" else "right")
     for quality in trial.qualities:
@@ -182,8 +182,8 @@ def _print_pairs(trial: "PairTrial") -> None:
     table = Table(title="The same, by what was changed (pairs)", title_justify="left")
     for heading in ("change", "pairs", *names):
         table.add_column(heading, justify="left" if heading == "change" else "right", no_wrap=True)
-    for kind in told_by_kind(trial.tested, trial.thresholds):
-        table.add_row(kind.kind, str(kind.pairs), *(f"{kind.told[name]:.2f}" for name in names))
+    for kind in accuracy_by_kind(trial.tested, trial.thresholds):
+        table.add_row(kind.kind, str(kind.pairs), *(f"{kind.correct[name]:.2f}" for name in names))
     out.print(table)
 
 
@@ -203,7 +203,7 @@ COMMANDS = (
     Command(
         "pairs",
         pairs_command,
-        "Tell the same place from look-alikes under changes of viewpoint, light and objects (the paper's Table 2).",
+        "Separate same places from hard negatives under changes of viewpoint, light and objects (the paper's Table 2).",
         example("semslam pairs SEQ1 SEQ2 --detectors semantic,fused", "semslam pairs --folder MY_PAIRS"),
     ),
 )

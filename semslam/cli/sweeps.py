@@ -48,7 +48,7 @@ def compare_command(
     jobs: Jobs = 1,
     as_json: options.Json = False,
 ) -> None:
-    """Track a sequence once, run each detector on that, and print the figures side by side."""
+    """Track a sequence once, run each detector on that, and print the metrics side by side."""
     from semslam.datasets import open_dataset
     from semslam.runs.place import link_latest, new_directory
 
@@ -225,7 +225,7 @@ COMMANDS = (
     Command(
         "compare",
         compare_command,
-        "Track a sequence once, run each detector on that, and print the figures side by side.",
+        "Track a sequence once, run each detector on that, and print the metrics side by side.",
         example("semslam compare DIR --detectors none,semantic"),
     ),
     Command(

@@ -1,7 +1,7 @@
 """YAML as people mean it: no doubled keys, no octal or clock numbers, no bombs; the core schema of YAML 1.2.
 
 PyYAML follows YAML 1.1, where ``0640`` is 416, ``12:30`` is 750, ``1e3`` is a text and the last of two equal keys
-wins without a word (https://yaml.org/spec/1.2.2/#103-core-schema has the rules that hold here).
+wins without an error (https://yaml.org/spec/1.2.2/#103-core-schema has the rules that hold here).
 """
 
 import re

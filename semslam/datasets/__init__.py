@@ -27,7 +27,7 @@ def open_dataset(path: str | Path, config: DatasetConfig | None = None, *, loade
     Args:
         path: a folder, a ROS bag, or ``synthetic:SCENE?key=value``.
         config: which frames are read, and how.
-        loader: registered name of its kind; None = as the settings say, or else guessed from the path.
+        loader: registered name of its kind; None = that of the settings, or else guessed from the path.
 
     Returns:
         The sequence with start, stride, max_frames and faults of the settings applied.
@@ -75,7 +75,7 @@ def guess_loader(path: str | Path) -> str:
     is asked in turn whether it recognises the path.
 
     Raises:
-        DatasetError: there is no such path, or no loader recognises it; the message says what was looked for.
+        DatasetError: there is no such path, or no loader recognises it; the message lists what was looked for.
     """
     text, place = str(path), Path(path)
     if not place.exists():

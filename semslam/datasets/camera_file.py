@@ -26,7 +26,7 @@ class CameraSetup:
 
     Attributes:
         intrinsics: the camera; fy is positive.
-        depth_scale: units of the depth images per metre, or None where the source does not say.
+        depth_scale: units of the depth images per metre, or None where the source states none.
         scale_stated: whether a user or the sequence's own file states it, so that it holds for floating-point
             depth too.
         y_up: the source gave a negative fy: its poses are those of a camera whose y axis points up
@@ -48,7 +48,7 @@ def read_camera(path: Path) -> CameraSetup:
     """Read a camera.yaml: width height fx fy cx cy; optionally distortion (k1 k2 p1 p2 k3), depth_scale, readout.
 
     A negative fy is read as in ICL-NUIM: the images are upright all the same, so the camera gets its size, and
-    ``y_up`` says that the poses are mirrored.
+    ``y_up`` states that the poses are mirrored.
 
     Raises:
         DatasetError: the file cannot be read, or a key is missing, unknown or no usable number.

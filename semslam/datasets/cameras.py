@@ -33,7 +33,7 @@ def bonn_camera_poses(poses: FloatArray) -> FloatArray:
     """Camera poses (N, 4, 4) of Bonn's ground truth, which follows the markers on the sensor.
 
     The data set's page (https://www.ipb.uni-bonn.de/data/rgbd-dynamic-dataset/) gives T_ROS and T_m with
-    T_world_cam = T_ROS^-1 T T_ROS T_m. Its T_m carries a scale of 1.059 on top of the rotation; the rotation
+    T_world_cam = T_ROS^-1 T T_ROS T_m. Its T_m has a scale of 1.059 on top of the rotation; the rotation
     nearest to it is used, so that poses stay rigid.
     """
     T_ros = np.array([[-1.0, 0, 0, 0], [0, 0, 1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
@@ -161,8 +161,8 @@ def _comments(file: Path) -> str:
 def find_camera(folder: Path, config: DatasetConfig) -> CameraSetup | None:
     """The camera that the user, a camera.yaml in the folder or the known family gives, in that order.
 
-    The depth scale is looked for in the same order, on its own. Which way the ground truth's y points is said by
-    the sequence's own camera.yaml, or else by the family: a camera that the user names says nothing of poses,
+    The depth scale is looked for in the same order, on its own. Which way the ground truth's y points is stated by
+    the sequence's own camera.yaml, or else by the family: a camera that the user names states nothing about poses,
     unless its fy is negative.
 
     Raises:

@@ -35,7 +35,7 @@ class Dataset(Protocol):
 
     @property
     def notes(self) -> list[str]:
-        """What was assumed, mended or left out while the lists were read, a sentence each."""
+        """What was assumed, corrected or left out while the lists were read, a sentence each."""
 
     def __len__(self) -> int:
         """Number of frames."""
@@ -52,7 +52,7 @@ class Dataset(Protocol):
 
 
 class DatasetLoader(Dataset, Protocol):
-    """A dataset class that can be registered: it opens a path, and may say which paths are its own.
+    """A dataset class that can be registered: it opens a path, and may recognise which paths are its own.
 
     Attributes:
         layout: what a path of this kind looks like, for the error that names what was looked for.

@@ -65,7 +65,7 @@ def download(
     Args:
         name: such as "fr1/room".
         directory: where the sequence's folder goes; made if needed.
-        progress: called with the bytes so far and the total (None where the server does not say).
+        progress: called with the bytes so far and the total (None where the server states none).
         base_url: a mirror laid out like the benchmark's server.
         time_limit: seconds that the transfer may take; what has arrived by then is kept for the next call.
 

@@ -131,8 +131,8 @@ def _pair_stamps(
 ) -> list[ImagePair]:
     unit = TimeUnit.MICROSECONDS if first.naming is Naming.INDEX_STAMPS else config.time_unit
     colors, depths = (
-        in_order(files[0].parent.name, named.values, files, said, unit, named.numbers)
-        for files, named, said in ((color, first, notes), (depth, second, []))
+        in_order(files[0].parent.name, named.values, files, remarks, unit, named.numbers)
+        for files, named, remarks in ((color, first, notes), (depth, second, []))
     )
     return pair_by_time(colors, depths, config.association_window, color[0].parent.parent, notes)
 

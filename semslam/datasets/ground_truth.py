@@ -24,7 +24,7 @@ def read_ground_truth(
         setup: its camera; ``y_up`` has the poses mirrored.
         config: unit of the stamps, and frames per second of stamps that are frame numbers.
         numbered: whether the frames are known by numbers, so that whole stamps of the truth count frames too.
-        notes: gets what was mended or converted.
+        notes: receives what was corrected or converted.
 
     Raises:
         TrajectoryError: the file is there and not readable.
@@ -33,8 +33,8 @@ def read_ground_truth(
     files = [file for file in (folder / GROUND_TRUTH, *icl_truth(folder)) if file.is_file()]
     if not files:
         return None
-    truth, mended = read_trajectory(files[0], config.time_unit)
-    notes += mended
+    truth, corrected = read_trajectory(files[0], config.time_unit)
+    notes += corrected
     stamps, poses = truth.timestamps, truth.poses
     if numbered and are_frame_numbers(stamps):
         notes.append(f"{files[0].name}: its stamps are frame numbers, {config.fps:g} a second.")

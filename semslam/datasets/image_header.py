@@ -1,4 +1,4 @@
-"""What an image file says of itself before any pixel is decoded, and whether its bytes are sound."""
+"""What an image file's header states before any pixel is decoded, and whether its bytes are sound."""
 
 import struct
 import warnings

@@ -19,7 +19,7 @@ class ImagePair:
         timestamp: seconds.
         color: the colour image.
         depth: the depth image.
-        number: of the colour image in the source: in its list, or as its name says.
+        number: of the colour image in the source: in its list, or by its name.
     """
 
     timestamp: float
@@ -35,10 +35,10 @@ class ImageSequence:
         name: short name.
         intrinsics: the camera.
         depth_scale: units of the depth images per metre; where it is assumed, the first image is read, and a note
-            says what it implies.
+            states what it implies.
         pairs: the frames, strictly ascending in time.
         ground_truth: T_world_cam, or None.
-        notes: what was assumed or mended while the lists were read.
+        notes: what was assumed or corrected while the lists were read.
 
     Raises:
         DatasetError: there is no frame.
@@ -91,7 +91,7 @@ class ImageSequence:
             return []
         try:
             raw = read_depth(self._pairs[0].depth, DepthScale(1.0))
-        except DatasetError:  # the frame will say so when it is its turn
+        except DatasetError:  # reading the frame itself will raise it again
             return [self._depth_scale.describe(None)]
         if (raw != np.rint(raw)).any():
             return []

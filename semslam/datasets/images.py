@@ -19,7 +19,7 @@ IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".pgm", ".ppm", ".tif", ".tiff", ".bm
 DISTANT = 1e4
 """Metres; a depth image of floating-point values beyond this holds none there."""
 
-# An EXIF orientation is ignored: depth images carry none, and the two must stay aligned.
+# An EXIF orientation is ignored: depth images have none, and the two must stay aligned.
 _COLOR_FLAGS = cv2.IMREAD_COLOR_RGB | cv2.IMREAD_IGNORE_ORIENTATION
 
 
@@ -30,7 +30,7 @@ class DepthScale:
     Attributes:
         integers: of images of whole numbers.
         floats: of images of floating-point numbers, which are metres unless something else is stated.
-        assumed: whether nobody states the scale of whole numbers, so that it has to be said what it implies.
+        assumed: whether nobody states the scale of whole numbers, so that a note has to state what it implies.
     """
 
     integers: float

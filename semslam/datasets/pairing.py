@@ -46,7 +46,7 @@ def in_order(
         name: of the list, for the notes.
         stamps: in the unit of the file.
         paths: one for each stamp.
-        notes: gets what was mended or converted.
+        notes: receives what was corrected or converted.
         unit: of the stamps, where the user states it.
         numbers: of the images in their source; None = their places in order of time.
 

@@ -24,7 +24,7 @@ MIN_CONTRAST = 2.0
 NOISE_STEP, NOISE_SHARE = 0.05, 0.3
 """Depth that differs from its surroundings by 5 % at 30 % of the pixels; sensors stay below 2 % of the pixels."""
 MIN_SCORED = 3
-"""Frames with enough depth edges before their agreement with colour is believed."""
+"""Frames with enough depth edges before their agreement with colour is judged."""
 MIRRORED, MIRRORED_LEAD = 0.5, 0.4
 """Agreement of colour with mirrored depth that counts, and by how much it has to be better (``edge_agreement``)."""
 

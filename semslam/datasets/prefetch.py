@@ -17,7 +17,7 @@ def prefetch(dataset: Dataset, ahead: int = 4) -> Iterator[Frame | DatasetError]
 
     Args:
         dataset: the sequence.
-        ahead: frames kept ready at the most.
+        ahead: maximum number of frames kept ready.
 
     Yields:
         One item per frame, in order: the frame, or the error that stands in its place.

@@ -29,7 +29,7 @@ def to_intrinsics(info: Any, topic: str) -> Intrinsics:
     """The camera of a sensor_msgs CameraInfo of ROS 1 or ROS 2; a distortion model other than Brown's counts as none.
 
     Raises:
-        DatasetError: its figures are not usable.
+        DatasetError: its values are not usable.
     """
     K = info.K if hasattr(info, "K") else info.k
     coefficients = list(info.D if hasattr(info, "D") else info.d)

@@ -63,13 +63,13 @@ def shared_namespace(first: str, second: str) -> int:
 
 
 def choose_color(images: Iterable[TopicT]) -> list[TopicT]:
-    """Topics that can be colour, the likeliest first: named so, then most messages, then the shorter name."""
+    """Topics that can be colour, the most likely first: named so, then most messages, then the shorter name."""
     fitting = [image for image in images if role_of(image.topic) in (Role.COLOR, None)]
     return sorted(fitting, key=lambda t: (role_of(t.topic) is None, -t.msgcount, len(t.topic), t.topic))
 
 
 def choose_depth(images: Iterable[TopicT], color: str) -> list[TopicT]:
-    """Topics that can be depth, the likeliest first: registered to colour, then of the colour image's device."""
+    """Topics that can be depth, the most likely first: registered to colour, then of the colour image's device."""
     fitting = [image for image in images if role_of(image.topic) is Role.DEPTH]
 
     def rank(t: TopicT) -> tuple[bool, int, bool, int, int, str]:

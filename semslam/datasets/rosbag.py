@@ -66,8 +66,8 @@ class RosbagDataset:
         self.intrinsics, self._depth_scale = setup.intrinsics, setup.depth(MILLIMETRES)
         self._times_ns = self._pair(path, config, notes)
         self.timestamps = [color / 1e9 for color, _ in self._times_ns]
-        self.ground_truth, mended = _read_ground_truth(path, config)
-        self.notes = [printable(note) for note in (*notes, *self._assumptions(), *mended)]
+        self.ground_truth, corrected = _read_ground_truth(path, config)
+        self.notes = [printable(note) for note in (*notes, *self._assumptions(), *corrected)]
 
     @classmethod
     def recognises(cls, path: Path) -> bool:
@@ -157,7 +157,7 @@ class RosbagDataset:
             if holds_floats(message):
                 return []
             depth = to_depth(message, self._depth.topic, self._depth_scale)
-        except DatasetError:  # the frame will say so when it is its turn
+        except DatasetError:  # reading the frame itself will raise it again
             return [self._depth_scale.describe(None)]
         seen = depth[depth > 0]
         return [self._depth_scale.describe(float(np.median(seen)) if len(seen) else None)]
@@ -182,7 +182,7 @@ def _open_reader(path: Path) -> "AnyReader":
 def _chosen(
     images: "list[Connection]", wanted: str | None, likely: "list[Connection]", kind: str, path: Path
 ) -> "Connection":
-    """The wanted topic, or the likeliest."""
+    """The wanted topic, or the most likely one."""
     fitting = likely if wanted is None else [connection for connection in images if connection.topic == wanted]
     if not fitting:
         known = ", ".join(sorted({connection.topic for connection in images})) or "none"

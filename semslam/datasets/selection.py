@@ -70,7 +70,7 @@ class Selection(ChosenFrames):
     Args:
         dataset: the whole sequence.
         start: frames left out at its beginning.
-        max_frames: frames taken at the most; None = all.
+        max_frames: maximum number of frames taken; None = all.
         stride: 1 takes every frame, 2 every second.
 
     Raises:

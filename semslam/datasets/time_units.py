@@ -17,7 +17,7 @@ LONG_STEP = 2000.0
 SHORT_STEP = 8.0
 MAX_DIGITS = 20
 MIN_ROWS = 10
-"""How many whole, unevenly spaced stamps it takes before small steps are believed to be milliseconds."""
+"""Minimum number of whole, unevenly spaced stamps from which small steps are read as milliseconds."""
 
 
 class TimeUnit(StrEnum):
@@ -49,7 +49,7 @@ def read_stamp(text: str) -> float:
 
 
 def to_seconds(stamps: Sequence[float], name: str, notes: list[str], unit: str | None = None) -> FloatArray:
-    """Stamps (N,) in seconds; where they were something else, a note says so.
+    """Stamps (N,) in seconds; where they were something else, a note states it.
 
     Args:
         stamps: as ``read_stamp`` gives them, in any order.
@@ -73,7 +73,7 @@ def to_seconds(stamps: Sequence[float], name: str, notes: list[str], unit: str |
 def recognise_unit(stamps: FloatArray, name: str = "The file") -> TimeUnit:
     """The unit of stamps (N,), by what they count from and how far apart they are.
 
-    Stamps that count from 1970 give themselves away by their size. Those that count from a device's start are
+    Stamps that count from 1970 are recognised by their size. Those that count from a device's start are
     known by their median spacing: a camera takes between 5 and 200 images a second, and no list of images or poses
     has half an hour between two.
 

@@ -63,10 +63,10 @@ def read_poses(
         rate: poses a second of a KITTI file that has no file of stamps beside it.
 
     Returns:
-        The trajectory and what was mended or assumed, a sentence each.
+        The trajectory and what was corrected or assumed, a sentence each.
 
     Raises:
-        TrajectoryError: the file cannot be read or is not written so, or nothing says when its poses were.
+        TrajectoryError: the file cannot be read or is not written so, or nothing states the times of its poses.
     """
     path = Path(path)
     form = form or recognise_format(path)

@@ -33,7 +33,7 @@ class _Table:
 
 
 def read_trajectory(path: str | Path, unit: str | None = None) -> tuple[Trajectory, list[str]]:
-    """Read a TUM trajectory, mending what real files have wrong with them.
+    """Read a TUM trajectory and correct the faults that real files have.
 
     Comments and empty lines are skipped. Rows with a value that is not finite, absurdly large, or without a rotation
     are dropped, unsorted rows are sorted, of rows with the same stamp the first is kept. Quaternions are normalised.
@@ -45,7 +45,7 @@ def read_trajectory(path: str | Path, unit: str | None = None) -> tuple[Trajecto
         unit: of the stamps ("s", "ms", "us" or "ns"), where it is known; None = recognised.
 
     Returns:
-        The trajectory and what was mended, a sentence each.
+        The trajectory and what was corrected, a sentence each.
 
     Raises:
         TrajectoryError: the file cannot be read, is no such table, no row of it is usable, or the unit of its stamps

@@ -139,7 +139,7 @@ def refine_pose(
     """Minimise the robust reprojection error over the pose (Gauss-Newton, Huber weights, outliers dropped by rounds).
 
     Args:
-        T_ref_cam: (4, 4) first guess.
+        T_ref_cam: (4, 4) initial guess.
         points_ref: (N, 3) landmarks in the reference frame, metres.
         seen: what was measured of them.
         camera: the camera.
@@ -152,7 +152,7 @@ def refine_pose(
     """
     T = T_ref_cam
     errors = squared_errors(T, points_ref, seen, camera)
-    # The first guess may be pixels away: the first round takes everything in view and trusts to the Huber weights.
+    # The initial guess may be pixels away: the first round takes everything in view and relies on the Huber weights.
     kept = np.isfinite(errors)
     H = np.eye(6)
     for _ in range(rounds):

@@ -16,7 +16,7 @@ VOXEL = 0.04
 NORMAL_RADIUS = 3.0
 """Voxels; a point's normal is that of the plane through its neighbours within this distance."""
 NEIGHBOURS = 30
-"""Neighbours that take part in a normal at the most."""
+"""Maximum number of neighbours from which a normal is computed."""
 
 
 class SurfaceFusion:

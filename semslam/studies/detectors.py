@@ -34,7 +34,7 @@ class DetectorComparison:
     """Detectors on one sequence.
 
     Attributes:
-        qualities: figures, in the order of the names.
+        qualities: metrics, in the order of the names.
         curves: precision and recall by detector.
         reliabilities: share of true pairs by score, by detector.
     """

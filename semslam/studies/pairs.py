@@ -1,4 +1,4 @@
-"""Same place or only alike: detectors tried on pairs of frames (the paper's Table 2), out of sequences or a folder."""
+"""Same place or hard negative: detectors tried on pairs of frames (the paper's Table 2), of sequences or a folder."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -34,7 +34,7 @@ TUNING_SCENE = "synthetic:house"
 """What the threshold comes from where nothing else is given."""
 
 Report = Callable[[str, int, int], None]
-"""Told which set is worked on, how many frames are done, and of how many."""
+"""Called with the set that is worked on, how many frames are done, and of how many."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,7 +120,7 @@ def sequence_pairs(
     """
     dataset = open_dataset(path, config.dataset)
     if dataset.ground_truth is None:
-        raise DatasetError(f"{dataset.name} has no ground truth, which tells the same place from others.")
+        raise DatasetError(f"{dataset.name} has no ground truth, which is needed to choose pairs.")
     chosen = range(0, len(dataset), every)
     stamps = [dataset.timestamps[index] for index in chosen]
     poses, covered = poses_at(dataset.ground_truth, stamps)

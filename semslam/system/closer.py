@@ -68,7 +68,7 @@ class LoopCloser:
 
     The closer never touches the caller's graph: what enters it, and what is taken out again, is the caller's to
     decide. Two rooms that look and measure alike pass every test on two views: only odometry distinguishes them, so
-    ask ``believed`` before a loop is trusted for good.
+    call ``believed`` before a loop is accepted for good.
 
     Args:
         intrinsics: the camera of all images.
@@ -177,10 +177,10 @@ class LoopCloser:
         self._worker.close()
 
     def believed(self, graph: gtsam.NonlinearFactorGraph) -> list[Closure]:
-        """Closures that semslam's own pose graph would follow, given the caller's odometry; the others are doubtful.
+        """Closures that semslam's own pose graph accepts, given the caller's odometry.
 
         They lie within what odometry can have drifted, no clearly better founded one puts the same view elsewhere,
-        and they fit one another. A closure that is doubtful now may be believed once others bear it out, and the
+        and they fit one another. A closure that is not accepted now may be once others support it, and the
         reverse. Each call optimises a graph of the closer's keyframes by the settings ``backend``.
 
         Args:
@@ -218,7 +218,7 @@ class LoopCloser:
     def contradicted(self, values: gtsam.Values) -> list[Closure]:
         """Closures that lie farther from these estimates than a true one should (``backend.max_residual``).
 
-        Quick, but an estimate that follows false closures agrees with them: see ``believed``.
+        A quick check; an estimate that follows false closures agrees with them: see ``believed``.
 
         Args:
             values: the caller's current estimate; closures whose keys it lacks are passed over.
@@ -239,9 +239,9 @@ class LoopCloser:
 
     def _edge(self, constraint: LoopConstraint, match_key: int, query_key: int) -> Edge:
         seen = loop_edge(constraint)
-        carry = adjoint(self._T_body_cam)
+        Ad = adjoint(self._T_body_cam)
         T_match_query = self._T_body_cam @ seen.T_from_to @ invert(self._T_body_cam)
-        return Edge(match_key, query_key, T_match_query, carry @ seen.covariance @ carry.T)
+        return Edge(match_key, query_key, T_match_query, Ad @ seen.covariance @ Ad.T)
 
     def _check(self, key: int, timestamp: float) -> None:
         if not isinstance(key, int | np.integer):

@@ -116,7 +116,7 @@ def build_closing(
 
     Raises:
         ConfigError: a name is unknown.
-        ModelError: the network's weights are missing or damaged; a process says so at the first keyframe's answer.
+        ModelError: the network's weights are missing or damaged; a process raises it at the first keyframe's answer.
     """
     if config.detector == NoLoops.name:
         return None

@@ -1,4 +1,4 @@
-"""The last step of a run: keyframes moved so that the points which several of them see fall into place."""
+"""The last step of a run: bundle adjustment of keyframes and the landmarks that they share."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -13,7 +13,7 @@ from semslam.loop.verification.neighbours import shared_features
 from semslam.types import Keyframe, Observations
 
 SEEN_TWICE = {"min_views": 2}
-"""Features that closures share are no part of odometry, so that two views of one already say something new."""
+"""Features that closures share are no part of odometry, so that two views of one already add information."""
 
 
 def refine(
@@ -37,7 +37,7 @@ def refine(
     settings = config.backend.bundle
     loops: Sequence[Edge] = solution.loops
     if observations:
-        # A map that keeps landmarks has tied old keyframes to new ones already, and each loop says much of the same.
+        # A map that keeps landmarks has joined old keyframes to new ones already; loops repeat much of that.
         loops = discounted(loops)
     elif settings.rounds and settings.closures and loops:
         observations = _shared(solution, keyframes, config)

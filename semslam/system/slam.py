@@ -35,14 +35,14 @@ class _Anchor:
     covariance: FloatArray
 
     def extend(self, motion: Motion) -> None:
-        carry = adjoint(invert(motion.T_prev_cur))
-        self.covariance = carry @ self.covariance @ carry.T + motion.covariance
+        Ad = adjoint(invert(motion.T_prev_cur))
+        self.covariance = Ad @ self.covariance @ Ad.T + motion.covariance
 
 
 class Slam:
     """RGB-D SLAM: odometry, keyframes, loop closing, pose graph.
 
-    Tracking never reads what loops say, so that the result is the same wherever loop closing runs. Its answer for a
+    Tracking never reads the loops, so that the result is the same wherever loop closing runs. Its answer for a
     keyframe moves the live poses from the frame at which ``loops.delay`` further keyframes have been made, never
     sooner and never later.
 

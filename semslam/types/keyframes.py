@@ -36,7 +36,7 @@ class Keyframe:
 
     @property
     def finest(self) -> Features:
-        """The most keypoints there are."""
+        """The larger of the two keypoint sets: ``details`` where there are any, else ``features``."""
         return self.features if self.details is None else self.details
 
 

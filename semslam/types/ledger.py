@@ -10,7 +10,7 @@ from semslam.types.loops import LoopEvidence, NodePair
 
 
 class LoopJudgement(StrEnum):
-    """What ground truth says of an accepted loop."""
+    """An accepted loop judged by ground truth."""
 
     TRUE = "true"
     INACCURATE = "inaccurate"

@@ -34,7 +34,7 @@ class Observations:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Motion:
-    """What odometry says of one frame.
+    """What odometry reports of one frame.
 
     Attributes:
         T_prev_cur: (4, 4) motion since the previous frame; a prediction where the status is LOST.

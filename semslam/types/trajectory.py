@@ -20,7 +20,7 @@ class Trajectory:
         poses: (N, 4, 4) T_world_cam; given as an array or as a sequence of poses, such as of ``gtsam.Pose3``.
 
     Raises:
-        TrajectoryError: shapes differ, a figure is not finite, stamps do not ascend, a rotation is not orthonormal.
+        TrajectoryError: shapes differ, a value is not finite, stamps do not ascend, a rotation is not orthonormal.
     """
 
     timestamps: FloatArray

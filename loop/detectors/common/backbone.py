@@ -21,7 +21,7 @@ AFTER_ENCODER = "/network/aspp/point/conv/Conv"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Encoding:
-    """What the encoder says of an image, at a sixteenth of the network's input size.
+    """The encoder's features of an image, at a sixteenth of the network's input size.
 
     Attributes:
         middle: (h, w, 96) float32, block 13.

@@ -1,4 +1,4 @@
-"""Vectors of keyframes compared by their cosine, freed of half of what they have in common."""
+"""Vectors of keyframes compared by their cosine, less half of their mean."""
 
 import numpy as np
 
@@ -8,14 +8,14 @@ from semslam.types import Float32Array, FloatArray
 COMMON_SHARE = 0.5
 """How much of the mean is taken out: all of it would hide a place that the camera hardly left."""
 COMMON_AFTER = 30
-"""Keyframes after which half of that share is reached; a mean of few says little of the surroundings."""
+"""Keyframes after which half of that share is reached; a mean of few keyframes does not describe the surroundings."""
 
 
 def common_part(mean: FloatArray, count: int) -> Float32Array:
-    """What vectors are freed of before they are compared, (D,).
+    """The common part (D,) that is subtracted from vectors before they are compared.
 
-    All rooms of a house, and all pictures of a camera, look alike in ways that tell no place from another; what is
-    learned on photos of many houses takes them for signs of a place.
+    All rooms of a house, and all pictures of a camera, share an appearance that distinguishes no place from another;
+    a descriptor learned on photos of many houses takes it for evidence of one place.
 
     Args:
         mean: (D,) of the keyframes so far.
@@ -28,7 +28,7 @@ class CosineRows:
     """Vectors, and their cosines with another one when a common part is taken out of all of them.
 
     Args:
-        dimensions: figures of a vector.
+        dimensions: length of a vector.
     """
 
     def __init__(self, dimensions: int) -> None:
@@ -54,10 +54,10 @@ class CosineRows:
 
 
 class WholeIndex:
-    """Scores images by the cosine of their descriptors, freed of their common part.
+    """Scores images by the cosine of their descriptors, less their common part.
 
     Args:
-        dimensions: figures of a descriptor.
+        dimensions: length of a descriptor.
     """
 
     def __init__(self, dimensions: int) -> None:

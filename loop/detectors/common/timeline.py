@@ -49,7 +49,7 @@ class Timeline:
         return self._top(query, np.where(scores >= self._min_score, scores, 0.0))
 
     def nearest(self, query: Keyframe, scores: FloatArray) -> list[int]:
-        """The same without the least score that makes a candidate."""
+        """The same without the minimum score of a candidate."""
         return self._top(query, scores)
 
     def _top(self, query: Keyframe, scores: FloatArray) -> list[int]:

@@ -1,4 +1,4 @@
-"""Reading the arrays that detectors ship, with a clear word when they do not fit."""
+"""Reading the arrays that detectors ship, with a clear error where they do not fit."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager

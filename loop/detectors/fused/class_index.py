@@ -11,14 +11,14 @@ from semslam.types import FloatArray
 
 
 class ClassIndex:
-    """Scores images by what their common classes look like.
+    """Scores images by the features of their common classes.
 
     The score is the sum over common classes of the smaller share times the cosine, over the geometric mean of both
     images' sums of shares: 1 for the same picture, 0 where no class is shared. What the classes of all images have in
     common is taken out first, as from the whole image.
 
     Args:
-        channels: figures of a class's look.
+        channels: length of a class's feature vector.
     """
 
     def __init__(self, channels: int) -> None:

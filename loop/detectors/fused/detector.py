@@ -43,18 +43,18 @@ class _Look:
 
 
 class FusedDetector:
-    """The look of the whole image, its words, and the look of each class in it, joined to a probability.
+    """Features of the whole image, its words, and features of each class in it, joined to a probability.
 
     - whole: two layers of the encoder, pooled to one vector by a generalised mean of their positive and negative
-      parts and projected so that what viewpoint and light change is shrunk; cosine;
+      parts and projected so that what changes with viewpoint and light is suppressed; cosine;
     - words: square root of the L1 score of tf-idf bags of ORB words;
     - classes: the encoder's mid-level features averaged over each segmented class, as they differ from the class's
-      usual look, compared class by class and weighed by the class's share of the image; classes that people move
-      count less than structure.
+      mean features in photos, compared class by class and weighed by the class's share of the image; classes that
+      people move count less than structure.
 
     Images are turned upright by the tracked roll first. Cosines are taken without half of what the keyframes so far
     have in common. A logistic function, learned on warped and relit photos of other places, joins the three. Some of
-    the candidates are the best by words alone: they are rarely the likeliest, and often the ones whose pose can be
+    the candidates are the best by words alone: their probability is rarely the highest, but their pose can often be
     verified.
     """
 
@@ -89,7 +89,7 @@ class FusedDetector:
         """Candidates by probability, with the share of each part and the labels in common.
 
         Raises:
-            ConfigError: the view carries no labels.
+            ConfigError: the view holds no labels.
         """
         if not len(self._timeline):
             return []
@@ -99,7 +99,7 @@ class FusedDetector:
         return [self._candidate(view, at, float(probability[at]), parts[at]) for at in chosen]
 
     def add(self, view: KeyframeView) -> None:
-        """Remember the view's look."""
+        """Remember the view's features."""
         look = self._look(view)
         self._whole.add(look.whole)
         self._words.add(look.bag)
@@ -114,7 +114,7 @@ class FusedDetector:
         encoding = self._backbone.encode(turn_image(shrink(view.color, size), roll))
         labels = turn_labels(cv2.resize(view.labels.labels, size, interpolation=cv2.INTER_NEAREST), roll)  # type: ignore[arg-type]
         movable = frozenset(i for i, name in enumerate(view.labels.names) if name in MOVABLE)
-        usual = self._model.usual_looks(view.labels.names)
+        usual = self._model.usual_features(view.labels.names)
         classes = pool_classes(encoding.middle, labels, movable).against(usual)
         bag = make_bag(self._vocabulary, view.keyframe.features.descriptors)
         return _Look(self._model.whole(encoding), bag, classes)

@@ -14,7 +14,7 @@ from semslam.types import Float32Array, FloatArray, UInt8Array
 
 SHIPPED = Path(__file__).parents[2] / "weights" / "fusion.npz"
 MOVABLE_WEIGHT = 0.5
-"""What a movable class counts beside structure, which stays where it is."""
+"""Weight of a movable class relative to structure, which does not move."""
 _KNOWN = {name: index for index, name in enumerate(NYU40_NAMES)}
 
 
@@ -24,8 +24,8 @@ class FusionModel:
 
     Attributes:
         mean: (832,) of the pooled descriptors.
-        projection: (832, D) that shrinks what changes with viewpoint and light, and keeps what tells places apart.
-        usual: (L, C) usual look of each class in photos, by its place in ``NYU40_NAMES``; row 0 is that of all.
+        projection: (832, D) that suppresses what changes with viewpoint and light, and keeps what distinguishes places.
+        usual: (L, C) mean features of each class in photos, by its place in ``NYU40_NAMES``; row 0 is that of all.
         weights: (3,) of the whole image, the words and the classes in the logistic score.
         bias: of the logistic score.
     """
@@ -40,8 +40,8 @@ class FusionModel:
         """The image's descriptor (D,), of no particular length."""
         return np.asarray((pool_layers(encoding) - self.mean) @ self.projection, dtype=np.float32)
 
-    def usual_looks(self, names: Sequence[str]) -> Float32Array:
-        """(L, C) the usual look of each of a segmenter's classes; that of all where a name is not known."""
+    def usual_features(self, names: Sequence[str]) -> Float32Array:
+        """(L, C) mean features of each of a segmenter's classes; the mean of all where a name is not known."""
         return self.usual[[_KNOWN.get(name, 0) for name in names]]
 
     def probability(self, parts: FloatArray) -> FloatArray:
@@ -79,7 +79,7 @@ def pool(features: Float32Array) -> Float32Array:
 
 
 def pool_layers(encoding: Encoding) -> Float32Array:
-    """Both layers of an image pooled, (832,): the last one tells rooms apart, the middle one parts of a room."""
+    """Both layers of an image pooled, (832,): the last one distinguishes rooms, the middle one parts of a room."""
     return np.concatenate([pool(encoding.high), pool(encoding.middle)])
 
 
@@ -89,7 +89,7 @@ class ClassFeatures:
 
     Attributes:
         labels: (K,) classes, ascending.
-        vectors: (K, C) float32, of unit length, or how those differ from the class's usual look.
+        vectors: (K, C) float32, of unit length, or their difference from the class's mean features.
         shares: (K,) square root of the share of the image, times the class's weight.
     """
 
@@ -98,7 +98,7 @@ class ClassFeatures:
     shares: FloatArray
 
     def against(self, usual: Float32Array) -> "ClassFeatures":
-        """How each class differs from its usual look, the row (L, C) of its label."""
+        """The difference of each class from its mean features, the row (L, C) of its label."""
         return replace(self, vectors=self.vectors - usual[self.labels])
 
 

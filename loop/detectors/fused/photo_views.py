@@ -1,4 +1,4 @@
-"""Two looks at one place, made of a photo: turned and zoomed virtual cameras, other light, a thing that is gone."""
+"""Two views of one place, made of a photo: turned and zoomed virtual cameras, other light, a thing that is gone."""
 
 from dataclasses import dataclass
 
@@ -14,7 +14,7 @@ FOCAL = 518.0 / 640.0
 PITCH, YAW, ROLL = np.radians(9), np.radians(12), np.radians(8)
 ZOOM = (1.2, 1.7)
 HIDDEN_SHARE = 0.25
-"""How many views miss something that the photo shows."""
+"""Share of the views from which something that the photo shows is removed."""
 GRID = 12
 
 

@@ -1,4 +1,4 @@
-"""Changes of light on a picture: for training comparisons that must not mind them, and for testing that they do not."""
+"""Changes of light on a picture: for training comparisons to be invariant to them, and for testing that they are."""
 
 import numpy as np
 

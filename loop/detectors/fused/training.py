@@ -1,4 +1,4 @@
-"""Learns the fusion from views of photos: which directions of a descriptor to trust, and how to join the parts."""
+"""Learns the fusion from views of photos: the projection of descriptors, and the weights of the parts."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,18 +19,18 @@ RIDGE = 2.0
 """Share of the mean variance that is added to each direction: photos show only some of what changes."""
 FOLDS = 4
 USUAL_PRIOR = 20.0
-"""Views full of a class, of which the usual look of all classes counts as much in that of a rare one."""
-STRANGERS = 8
+"""Weight, in views full of one class, of the mean over all classes in the mean of each."""
+NEGATIVES = 8
 """Pairs of different places for each pair of the same place."""
 APART = 15
 """Photos that follow each other may show one room; pairs of different places are at least this many photos apart."""
 ROUNDS = 3
-"""How often each view's likeliest stranger is looked for anew."""
+"""How often each view's hard negative is chosen anew."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Looks:
-    """Views of photos, described.
+class DescribedViews:
+    """Views of photos, with all that the detector's parts compute of them.
 
     Attributes:
         photo: (N,) number of the photo that each view shows a part of.
@@ -52,38 +52,38 @@ class _Fold:
     Attributes:
         parts: (N, N, 3) scores of whole image, words and classes.
         same: (N, N) pairs of the same place, each once.
-        strange: (N, N) pairs of different places, both ways.
+        negative: (N, N) pairs of different places, both ways.
     """
 
     parts: FloatArray
     same: BoolArray
-    strange: BoolArray
+    negative: BoolArray
 
 
-def train_fusion(looks: Looks, same: IntArray, seed: int) -> FusionModel:
+def train_fusion(described: DescribedViews, same: IntArray, seed: int) -> FusionModel:
     """Learn the projection from pairs of views, then how to join the parts on views that it did not see.
 
     Args:
-        looks: the views.
+        described: the views.
         same: (M, 2) pairs of views that overlap well.
         seed: of the pairs of different places.
     """
-    pairs, truth = _with_strangers(looks.photo, same, seed)
-    usual = learn_usual(looks.classes)
-    number = looks.photo * FOLDS // (int(looks.photo.max()) + 1)
+    pairs, truth = _with_negatives(described.photo, same, seed)
+    usual = learn_usual(described.classes)
+    number = described.photo * FOLDS // (int(described.photo.max()) + 1)
     folds = []
     for held in range(FOLDS):
         unseen = (number[pairs] != held).all(axis=1)
-        mean, projection = learn_projection(looks.pooled, pairs[unseen], truth[unseen])
-        descriptors = ((looks.pooled - mean) @ projection).astype(np.float32)
-        folds.append(_fold(looks, descriptors, usual, np.flatnonzero(number == held), same))
+        mean, projection = learn_projection(described.pooled, pairs[unseen], truth[unseen])
+        descriptors = ((described.pooled - mean) @ projection).astype(np.float32)
+        folds.append(_fold(described, descriptors, usual, np.flatnonzero(number == held), same))
     weights, bias = _join(folds, seed)
-    mean, projection = learn_projection(looks.pooled, pairs, truth)
+    mean, projection = learn_projection(described.pooled, pairs, truth)
     return FusionModel(mean, projection, usual, weights, bias)
 
 
 def learn_usual(classes: Sequence[ClassFeatures]) -> Float32Array:
-    """The usual look (41, C) of each NYUv2 class, by its share of the views; row 0, and rare ones, that of all."""
+    """Mean features (41, C) of each NYUv2 class, by its share of the views; row 0, and rare ones, those of all."""
     shares = np.concatenate([features.shares for features in classes])
     labels = np.concatenate([features.labels for features in classes])
     weighed = np.concatenate([features.vectors for features in classes]) * shares[:, None]
@@ -112,11 +112,11 @@ def learn_projection(pooled: Float32Array, pairs: IntArray, same: BoolArray) -> 
     return mean.astype(np.float32), projection.astype(np.float32)
 
 
-def _with_strangers(photo: IntArray, same: IntArray, seed: int) -> tuple[IntArray, BoolArray]:
-    drawn = np.random.default_rng(seed).integers(0, len(photo), (2 * STRANGERS * len(same), 2))
-    strange = drawn[np.abs(photo[drawn[:, 0]] - photo[drawn[:, 1]]) > APART][: STRANGERS * len(same)]
-    truth = np.concatenate([np.ones(len(same), np.bool_), np.zeros(len(strange), np.bool_)])
-    return np.concatenate([same, strange]), truth
+def _with_negatives(photo: IntArray, same: IntArray, seed: int) -> tuple[IntArray, BoolArray]:
+    drawn = np.random.default_rng(seed).integers(0, len(photo), (2 * NEGATIVES * len(same), 2))
+    negative = drawn[np.abs(photo[drawn[:, 0]] - photo[drawn[:, 1]]) > APART][: NEGATIVES * len(same)]
+    truth = np.concatenate([np.ones(len(same), np.bool_), np.zeros(len(negative), np.bool_)])
+    return np.concatenate([same, negative]), truth
 
 
 def _scatter(differences: FloatArray) -> FloatArray:
@@ -124,66 +124,68 @@ def _scatter(differences: FloatArray) -> FloatArray:
     return scatter
 
 
-def _fold(looks: Looks, descriptors: Float32Array, usual: Float32Array, members: IntArray, same: IntArray) -> _Fold:
-    classes = [looks.classes[i].against(usual) for i in members]
+def _fold(
+    described: DescribedViews, descriptors: Float32Array, usual: Float32Array, members: IntArray, same: IntArray
+) -> _Fold:
+    classes = [described.classes[i].against(usual) for i in members]
     whole_index, word_index = WholeIndex(descriptors.shape[1]), WordIndex()
     class_index = ClassIndex(usual.shape[1])
     for i, features in zip(members, classes, strict=True):
         whole_index.add(descriptors[i])
-        word_index.add(looks.bags[i])
+        word_index.add(described.bags[i])
         class_index.add(features)
     parts = np.empty((len(members), len(members), 3))
     for row, (i, features) in enumerate(zip(members, classes, strict=True)):
         parts[row, :, 0] = whole_index.scores(descriptors[i])
-        parts[row, :, 1] = np.sqrt(word_index.scores(looks.bags[i]))
+        parts[row, :, 1] = np.sqrt(word_index.scores(described.bags[i]))
         parts[row, :, 2] = class_index.scores(features)
-    places = np.full(len(looks.photo), -1)
+    places = np.full(len(described.photo), -1)
     places[members] = np.arange(len(members))
     first, second = places[same[(places[same] >= 0).all(axis=1)]].T
     together = np.zeros(parts.shape[:2], dtype=np.bool_)
     together[first, second] = True
-    photo = looks.photo[members]
+    photo = described.photo[members]
     return _Fold(parts, together, np.abs(photo[:, None] - photo) > APART)
 
 
 def _join(folds: Sequence[_Fold], seed: int) -> tuple[FloatArray, float]:
     """Weights (3,) and bias of the logistic score.
 
-    The direction is learned with each view's likeliest stranger among the pairs: what must be told apart are places
-    that look alike. How steep the function is, and where it lies, comes from pairs drawn at random, so that it is a
+    The direction is learned with each view's hard negative among the pairs: what must be separated are places that
+    look alike. Slope and offset of the function come from pairs drawn at random, so that it is a calibrated
     probability.
     """
     rng = np.random.default_rng(seed)
     same = np.concatenate([fold.parts[fold.same] for fold in folds])
-    strange = np.concatenate([_drawn(fold, rng) for fold in folds])
-    weights, _ = _logistic(same, strange)
+    negative = np.concatenate([_drawn(fold, rng) for fold in folds])
+    weights, _ = _logistic(same, negative)
     for _ in range(ROUNDS):
         hardest = np.concatenate([_hardest(fold, weights) for fold in folds])
-        weights, _ = _logistic(same, np.concatenate([strange, hardest]))
-    scale, bias = _logistic((same @ weights)[:, None], (strange @ weights)[:, None])
+        weights, _ = _logistic(same, np.concatenate([negative, hardest]))
+    scale, bias = _logistic((same @ weights)[:, None], (negative @ weights)[:, None])
     return weights * scale, bias
 
 
 def _drawn(fold: _Fold, rng: np.random.Generator) -> FloatArray:
-    rows, columns = np.nonzero(np.triu(fold.strange))
-    chosen = rng.choice(len(rows), min(STRANGERS * int(fold.same.sum()), len(rows)), replace=False)
+    rows, columns = np.nonzero(np.triu(fold.negative))
+    chosen = rng.choice(len(rows), min(NEGATIVES * int(fold.same.sum()), len(rows)), replace=False)
     return fold.parts[rows[chosen], columns[chosen]]
 
 
 def _hardest(fold: _Fold, weights: FloatArray) -> FloatArray:
-    likeliest = np.where(fold.strange, fold.parts @ weights, -np.inf).argmax(axis=1)
-    hardest: FloatArray = fold.parts[np.arange(len(likeliest)), likeliest]
+    nearest = np.where(fold.negative, fold.parts @ weights, -np.inf).argmax(axis=1)
+    hardest: FloatArray = fold.parts[np.arange(len(nearest)), nearest]
     return hardest
 
 
-def _logistic(same: FloatArray, strange: FloatArray) -> tuple[FloatArray, float]:
-    """Weights (D,) and bias of a logistic regression on standardised figures."""
+def _logistic(same: FloatArray, negative: FloatArray) -> tuple[FloatArray, float]:
+    """Weights (D,) and bias of a logistic regression on standardised values."""
     from sklearn.linear_model import LogisticRegression
     from sklearn.preprocessing import StandardScaler
 
-    figures = np.concatenate([same, strange])
-    scaler = StandardScaler().fit(figures)
-    truth = np.arange(len(figures)) < len(same)
-    model = LogisticRegression(C=1.0).fit(scaler.transform(figures), truth)
+    features = np.concatenate([same, negative])
+    scaler = StandardScaler().fit(features)
+    truth = np.arange(len(features)) < len(same)
+    model = LogisticRegression(C=1.0).fit(scaler.transform(features), truth)
     weights: FloatArray = model.coef_[0] / scaler.scale_
     return weights, float(model.intercept_[0] - weights @ scaler.mean_)

@@ -1,4 +1,4 @@
-"""Turning images upright by the tracked roll, so that a place looks alike however the camera was held."""
+"""Turning images upright by the tracked roll, so that descriptors do not depend on how the camera was held."""
 
 import cv2
 import numpy as np

@@ -13,7 +13,7 @@ from semslam.errors import ModelError
 from semslam.types import Float32Array, UInt8Array
 
 FILE = "alexnet-owt-7be5be79.pth"
-"""torchvision's file; its name carries the start of its SHA-256."""
+"""torchvision's file; its name holds the start of its SHA-256."""
 SIZE = 224
 MEAN = np.array([0.485, 0.456, 0.406], dtype=np.float32)
 DEVIATION = np.array([0.229, 0.224, 0.225], dtype=np.float32)
@@ -33,7 +33,7 @@ class AlexNetMap:
         """Read torchvision's weights.
 
         Raises:
-            ModelError: the file is missing, is not the one its name says, or does not hold AlexNet.
+            ModelError: the file is missing, does not have its name's checksum, or does not hold AlexNet.
         """
         try:
             digest = hashlib.sha256(path.read_bytes()).hexdigest()

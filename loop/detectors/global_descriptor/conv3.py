@@ -41,7 +41,7 @@ class Conv3Detector(DescriptorDetector):
 
     The original takes the third convolution of AlexNet. It is taken where ``conv3.alexnet`` names torchvision's
     weights; otherwise the last layer of the encoder that ships with the segmentation, which stands as deep in a
-    network that goes on behind it. ``features_from`` says which.
+    network that goes on behind it. ``features_from`` states which.
     """
 
     name = "conv3"

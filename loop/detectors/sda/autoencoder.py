@@ -32,7 +32,7 @@ class Autoencoder:
 
     @property
     def size(self) -> int:
-        """Figures in a code."""
+        """Length of a code."""
         return len(self.mean)
 
     def hidden(self, patches: Float32Array) -> Float32Array:
@@ -73,7 +73,7 @@ def train_autoencoder(patches: Float32Array, sizes: tuple[int, ...], seed: int) 
 
     Args:
         patches: (N, in) in 0..1.
-        sizes: figures of each layer.
+        sizes: units of each layer.
         seed: of weights, order and noise.
     """
     import torch

@@ -25,7 +25,7 @@ class SdaDetector:
     """Hidden codes of patches around keypoints, compared patch by patch.
 
     The strongest corner of each cell of an 8 x 6 grid gives a patch of 41 x 41 pixels; two layers turn it into a
-    code of 50 figures, whitened with the training photos' mean and deviation. A row of the similarity matrix is the
+    code of 50 values, whitened with the training photos' mean and deviation. A row of the similarity matrix is the
     mean over the query's patches of the best cosine with a patch at most two cells away. The original trains on the
     sequence it is run on and takes its pictures in order; here the network is trained on other photos.
     """

@@ -66,7 +66,7 @@ class SemanticDetector:
         """Candidates with their common labels and matched nodes; score = share of similar nodes.
 
         Raises:
-            ConfigError: the view carries no labels.
+            ConfigError: the view holds no labels.
         """
         nodes = self._extract(view)
         scores, label_shares = self._score(nodes, max(view.depth.shape))

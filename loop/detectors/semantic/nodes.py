@@ -40,10 +40,10 @@ def extract_nodes(label_map: LabelMap, depth: Float32Array, config: NodeConfig) 
     """Find the nodes of a segmented image.
 
     The pixels of a class fall into blocks of connected pixels; a block's node is its centroid with the depth
-    found there; nodes of a class that lie densely are merged. The paper says neither which neighbours connect
+    found there; nodes of a class that lie densely are merged. The paper states neither which neighbours connect
     pixels (8 here), nor what becomes of a node whose pixel has no depth (kept, at depth 0), nor the parameters of
     DBSCAN (40 pixels, 3 nodes, in the image plane and per class), nor whether small blocks count (all do, unless
-    ``min_area`` says otherwise); each is a setting.
+    ``min_area`` is set); each is a setting.
 
     Args:
         label_map: the segmentation.

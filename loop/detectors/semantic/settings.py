@@ -7,7 +7,7 @@ from semslam.config import Section, setting
 
 
 class ShareReading(StrEnum):
-    """What a count of common things is divided by; the paper's formulas (1) and (3) leave it open."""
+    """The denominator of a share of common labels or nodes; the paper's formulas (1) and (3) leave it open."""
 
     DICE = "dice"
     LARGER = "larger"

@@ -34,7 +34,7 @@ class Request(Section):
     """What may stand behind the question mark."""
 
     seed: int = Field(0, ge=0, description="seed of textures, small things, sway and noise")
-    frames: int = Field(0, ge=0, description="frames at the most; 0 = the whole way")
+    frames: int = Field(0, ge=0, description="maximum number of frames; 0 = the whole way")
     rate: float = Field(10.0, gt=0, le=1000, description="frames a second")
     width: int = Field(320, ge=64, le=4096, multiple_of=4, description="pixels; the height is three quarters of it")
     light: str = Field("same", description="light of the second pass: " + ", ".join(LIGHTS))
@@ -126,7 +126,7 @@ class SyntheticDataset:
 
     @property
     def notes(self) -> list[str]:
-        """Nothing is mended here."""
+        """Nothing is corrected here."""
         return []
 
     def __len__(self) -> int:

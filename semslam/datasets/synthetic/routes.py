@@ -11,7 +11,7 @@ class Stop:
     Attributes:
         x: metres.
         y: metres.
-        yaw: degrees in which it looks, counter-clockwise from +x; not wrapped, so that it tells the turn's sense.
+        yaw: degrees in which it looks, counter-clockwise from +x; not wrapped, so that it states the turn's sense.
         pitch: degrees, positive upwards.
     """
 

@@ -14,7 +14,7 @@ from semslam.geometry.se3 import FloatArray, exp_so3
 
 Vector = Sequence[float] | FloatArray
 SPACING = 0.22
-"""Metres between vertices at the most, so that light baked at them shows soft shadows."""
+"""Maximum distance between vertices in metres, so that light baked at them shows soft shadows."""
 WHOLE = np.array([[0.0, 0.0], [1.0, 1.0]])
 """Texture coordinates that show an image once."""
 
@@ -78,7 +78,7 @@ def quad(
         material: name.
         label: NYU40 id.
         uv: (2, 2) texture coordinates at the corner and opposite to it; metres along the edges where None.
-        spacing: metres between vertices at the most.
+        spacing: maximum distance between vertices, metres.
     """
     eu, ev = np.asarray(along_u, dtype=np.float64), np.asarray(along_v, dtype=np.float64)
     lengths = np.linalg.norm(eu), np.linalg.norm(ev)

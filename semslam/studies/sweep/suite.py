@@ -71,7 +71,7 @@ class Suite(_Part):
         settings: changes of the settings by a name of one's own.
         seeds: of everything random.
         starts: first frames.
-        max_frames: frames at the most; None = all.
+        max_frames: maximum number of frames; None = all.
         config: changes of the settings that all runs share.
         marks: published results, printed beside ours.
     """

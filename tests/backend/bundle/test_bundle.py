@@ -74,13 +74,13 @@ def test_noise_and_wrong_matches():
 def test_keypoints_count_by_how_exact_they_are():
     truth, points = world()
     errors = []
-    for told in (False, True):
+    for stated in (False, True):
         rng = np.random.default_rng(3)
         start, seen = shaken(truth, rng), look(truth, points, rng, 0.3)
         for key, one in seen.items():
             sigmas = rng.choice(np.float32([1.0, 8.0]), len(one.pixels))
             pixels = one.pixels + (rng.normal(size=one.pixels.shape) * 0.3 * sigmas[:, None]).astype(np.float32)
-            seen[key] = Observations(one.landmarks, pixels, one.depths, sigmas if told else None)
+            seen[key] = Observations(one.landmarks, pixels, one.depths, sigmas if stated else None)
         errors.append(error(adjust(start, seen, CAMERA, CONFIG).poses, truth))
     assert errors[1] < 0.8 * errors[0]
 
@@ -161,18 +161,18 @@ def test_landmarks_need_views_and_a_depth():
         0: Observations(np.array([1, 2, 3]), pixels, np.array([2.0, 0.0, 2.0], np.float32)),
         1: Observations(np.array([1, 2, 4]), pixels, np.array([0.0, 0.0, np.nan], np.float32)),
     }
-    sightings = gather(poses, seen, CAMERA, 2)
-    assert sightings.keys.tolist() == [0, 1]
-    assert len(sightings.points) == 1
-    assert np.allclose(sightings.local[0], [(200 - 320) / 525 * 2, (200 - 240) / 525 * 2, 2.0])
+    observed = gather(poses, seen, CAMERA, 2)
+    assert observed.keys.tolist() == [0, 1]
+    assert len(observed.points) == 1
+    assert np.allclose(observed.local[0], [(200 - 320) / 525 * 2, (200 - 240) / 525 * 2, 2.0])
 
 
 def test_thinning_keeps_each_keyframe_supplied():
     truth, points = world(16, 3000)
-    sightings = gather(dict(enumerate(truth)), look(truth, points, np.random.default_rng(7)), CAMERA, 2)
-    few = thinned(sightings, 100)
+    observed = gather(dict(enumerate(truth)), look(truth, points, np.random.default_rng(7)), CAMERA, 2)
+    few = thinned(observed, 100)
     counts = np.bincount(few.keys)
-    assert len(few) < len(sightings) / 2
+    assert len(few) < len(observed) / 2
     assert counts.min() > 60
     assert few.landmarks.max() == len(few.points) - 1
 

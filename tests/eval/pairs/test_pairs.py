@@ -23,7 +23,7 @@ from semslam.eval.pairs.judging import (
 )
 from semslam.eval.pairs.reader import read_pair_folder
 from semslam.eval.pairs.sheet import draw_sheet
-from semslam.eval.pairs.table import pair_rows, told_by_kind
+from semslam.eval.pairs.table import accuracy_by_kind, pair_rows
 from semslam.geometry.camera import Intrinsics
 from semslam.geometry.se3 import FloatArray, make_transform
 from semslam.types import Cloud, Features, Frame, Keyframe, KeyframeView, LoopCandidate, Trajectory
@@ -113,9 +113,9 @@ def test_an_oracle_is_right_and_a_blind_detector_half_right() -> None:
     assert {group.accuracy for group in oracle.groups.values()} == {1.0}
     assert {group.accuracy for group in blind.groups.values()} == {0.5}
     assert oracle.groups["objects"].pairs == 16
-    kinds = {row.kind: row for row in told_by_kind(sets, thresholds)}
-    assert kinds["gamma 2.5"].told == {"oracle": 1.0, "blind": 0.0}
-    assert kinds["look-alikes, objects"].told == {"oracle": 1.0, "blind": 1.0}
+    kinds = {row.kind: row for row in accuracy_by_kind(sets, thresholds)}
+    assert kinds["gamma 2.5"].correct == {"oracle": 1.0, "blind": 0.0}
+    assert kinds["hard negatives, objects"].correct == {"oracle": 1.0, "blind": 1.0}
     assert sum(row.pairs for row in kinds.values()) == 48
     rows = pair_rows(sets, thresholds).splitlines()
     assert len(rows) == 1 + 2 * 48

@@ -56,7 +56,7 @@ def test_fixed_poses_stay_bit_for_bit() -> None:
     assert np.array_equal(solve(problem).poses[4:], problem.poses[4:])
 
 
-def test_wrong_sightings_are_found_and_do_no_harm() -> None:
+def test_wrong_observations_are_found_and_do_no_harm() -> None:
     problem, poses, _ = scene(1, noise=0.3, wrong=0.05)
     adjustment = solve(problem)
     assert np.linalg.norm(adjustment.poses[:4, :3, 3] - poses[:4, :3, 3], axis=1).max() < 0.01

@@ -15,7 +15,7 @@ from semslam.loop.detectors.fused.class_index import ClassIndex
 from semslam.loop.detectors.fused.fusion import ClassFeatures, FusionModel, load_fusion, pool, pool_classes
 from semslam.loop.detectors.fused.photo_views import make_view, overlap
 from semslam.loop.detectors.fused.relighting import gamma, noise, relight, shadow, tint
-from semslam.loop.detectors.fused.training import Looks, learn_projection, learn_usual, train_fusion
+from semslam.loop.detectors.fused.training import DescribedViews, learn_projection, learn_usual, train_fusion
 from semslam.loop.detectors.fused.upright import roll_of, turn_image, turn_labels
 
 RNG = np.random.default_rng(0)
@@ -92,13 +92,13 @@ def test_the_join_trusts_what_tells_look_alikes_apart() -> None:
     count = 240
     photo = np.repeat(np.arange(count // 2), 2)
     kind = np.repeat(RNG.integers(0, 6, count // 2), 2)
-    looks = Looks(
+    described = DescribedViews(
         photo,
         (np.eye(6)[kind] + RNG.normal(0, 0.05, (count, 6))).astype(np.float32),
         [(np.array([at]), np.ones(1, np.float32)) for at in photo],
         [ClassFeatures(np.array([1], np.uint8), np.eye(6, dtype=np.float32)[[at]], np.ones(1)) for at in kind],
     )
-    model = train_fusion(looks, np.arange(count).reshape(-1, 2), seed=0)
+    model = train_fusion(described, np.arange(count).reshape(-1, 2), seed=0)
     same, alike = model.probability(np.array([[1.0, 1.0, 1.0], [1.0, 0.0, 1.0]]))
     assert same > 0.9
     assert alike < 0.5
@@ -171,7 +171,7 @@ def test_a_saved_model_comes_back(tmp_path) -> None:
     model.save(tmp_path / "m.npz")
     again = load_fusion(tmp_path / "m.npz")
     np.testing.assert_array_equal(again.projection, model.projection)
-    np.testing.assert_array_equal(again.usual_looks(["wall", "a new thing"]), usual[[1, 0]])
+    np.testing.assert_array_equal(again.usual_features(["wall", "a new thing"]), usual[[1, 0]])
     assert (again.bias, again.weights.tolist()) == (-1.0, [1, 2, 3])
 
 

@@ -169,8 +169,8 @@ def test_nodes_lead_to_the_pose_where_features_give_no_first_guess() -> None:
 
 
 def test_nodes_alone_are_no_proof() -> None:
-    strangers = keyframe(1, T_WORLD_QUERY, seed=5), keyframe(0, T_WORLD_MATCH)
-    outcome = IcpVerifier.from_config(Config()).verify(*strangers, with_nodes(8, 0.05))
+    elsewhere = keyframe(1, T_WORLD_QUERY, seed=5), keyframe(0, T_WORLD_MATCH)
+    outcome = IcpVerifier.from_config(Config()).verify(*elsewhere, with_nodes(8, 0.05))
     assert refused(outcome).reason in {"few_matches", "few_inliers"}
 
 
@@ -229,7 +229,7 @@ def test_free_space_is_violated_by_points_in_front_only() -> None:
 
 
 @pytest.mark.parametrize("name", ["redkitchen", "rgbd_dataset_freiburg1_rpy_first10s"])
-def test_real_neighbours_are_verified_at_the_true_pose_and_strangers_are_not(shared, name: str) -> None:
+def test_real_neighbours_are_verified_at_the_true_pose_and_other_places_are_not(shared, name: str) -> None:
     from semslam.datasets import open_dataset
     from semslam.eval.trajectory import poses_at
     from semslam.frontend.keyframes import KeyframeBuilder

@@ -52,7 +52,7 @@ def test_pairs_json_keeps_its_contract(semslam: Call, tmp_path: Path) -> None:
     assert all((float(row["score"]) >= float(row["threshold"])) == (row["same"] == "1") for row in rows)
     kinds = (out / "kinds.csv").read_text().splitlines()
     assert kinds[0] == "kind,pairs,thumbnail,hog"
-    assert '"look-alikes, objects",6,1.0000,1.0000' in kinds
+    assert '"hard negatives, objects",6,1.0000,1.0000' in kinds
     assert [(out / f"pairs-{n}.png").read_bytes()[:4] for n in (1, 2)] == [b"\x89PNG"] * 2
     assert "Thresholds from the other sets" in outcome.out
 
