@@ -66,15 +66,25 @@ class KeypointGrid:
         return np.clip(cells, 1, (self._columns - 2, self._rows - 2))
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Prediction:
+    """Where landmarks are expected in an image.
+
+    Attributes:
+        T_map_cam: (4, 4) predicted pose.
+        camera: the camera.
+        radius: pixels around the predicted place.
+        scale: factor between pyramid levels.
+    """
+
+    T_map_cam: FloatArray
+    camera: Intrinsics
+    radius: float
+    scale: float
+
+
 def match_guided(
-    landmarks: Landmarks,
-    wanted: IntArray,
-    features: Features,
-    grid: KeypointGrid,
-    T_map_cam: FloatArray,
-    camera: Intrinsics,
-    radius: float,
-    scale: float,
+    landmarks: Landmarks, wanted: IntArray, features: Features, grid: KeypointGrid, predicted: Prediction
 ) -> Matches:
     """Match landmarks to the keypoints near where they are expected.
 
@@ -82,18 +92,15 @@ def match_guided(
         landmarks: all landmarks.
         wanted: identities of those to look for.
         features: the image's keypoints.
-        grid: the same keypoints in cells no smaller than ``radius``.
-        T_map_cam: (4, 4) predicted pose.
-        camera: the camera.
-        radius: pixels around the predicted place; larger for coarser pyramid levels.
-        scale: factor between pyramid levels.
+        grid: the same keypoints in cells no smaller than the prediction's radius.
+        predicted: where they are expected.
     """
-    wanted, pixels, level = _in_view(landmarks, wanted, T_map_cam, camera, scale)
+    wanted, pixels, level = _in_view(landmarks, wanted, predicted)
     query, keypoint = grid.near(pixels)
     octave = features.octaves[keypoint]
     offset = features.pixels[keypoint] - pixels[query]
     distance = offset[:, 0] * offset[:, 0] + offset[:, 1] * offset[:, 1]
-    kept = np.flatnonzero((distance < radius**2) & (np.abs(octave - level[query]) < 1.6))
+    kept = np.flatnonzero((distance < predicted.radius**2) & (np.abs(octave - level[query]) < 1.6))
     query, keypoint = query[kept], keypoint[kept]
     ours = landmarks.descriptors[wanted].view(np.uint64)[query]
     theirs = features.descriptors.view(np.uint64)[keypoint]
@@ -102,10 +109,9 @@ def match_guided(
     return Matches(wanted[query], keypoint, wanted)
 
 
-def _in_view(
-    landmarks: Landmarks, wanted: IntArray, T_map_cam: FloatArray, camera: Intrinsics, scale: float
-) -> tuple[IntArray, FloatArray, FloatArray]:
+def _in_view(landmarks: Landmarks, wanted: IntArray, predicted: Prediction) -> tuple[IntArray, FloatArray, FloatArray]:
     """Which landmarks should be seen, where (N, 2) in pixels, and in which pyramid level (N,)."""
+    T_map_cam, camera = predicted.T_map_cam, predicted.camera
     rays = landmarks.positions[wanted] - T_map_cam[:3, 3]
     points = rays @ T_map_cam[:3, :3]
     z = np.maximum(points[:, 2], NEAREST)
@@ -113,7 +119,7 @@ def _in_view(
     v = camera.fy * points[:, 1] / z + camera.cy
     distance = np.maximum(np.sqrt(np.einsum("ij,ij->i", rays, rays)), NEAREST)
     cosine = np.einsum("ij,ij->i", rays, landmarks.directions[wanted]) / distance
-    level = np.log(landmarks.reach[wanted] / distance) / np.log(scale)
+    level = np.log(landmarks.reach[wanted] / distance) / np.log(predicted.scale)
     kept = (points[:, 2] > NEAREST) & (cosine > MIN_COSINE) & (level > -1.5)
     kept &= (u >= 0) & (u < camera.width) & (v >= 0) & (v < camera.height)
     return wanted[kept], np.column_stack([u[kept], v[kept]]), level[kept]

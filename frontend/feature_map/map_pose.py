@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from semslam.frontend.feature_map.guided import KeypointGrid, Matches, match_guided
+from semslam.frontend.feature_map.guided import KeypointGrid, Matches, Prediction, match_guided
 from semslam.frontend.feature_map.local_map import LocalMap
 from semslam.geometry.reprojection import Measurements, PoseEstimate, refine_pose
 from semslam.types import Features, FloatArray, IntArray, Intrinsics
@@ -72,7 +72,8 @@ def locate(
     found: tuple[Matches, PoseEstimate] | None = None
     for radius in radii:
         grid = KeypointGrid(view.features, view.camera, radius)
-        matches = match_guided(the_map.landmarks, wanted, view.features, grid, T_map_cam, view.camera, radius, scale)
+        predicted = Prediction(T_map_cam, view.camera, radius, scale)
+        matches = match_guided(the_map.landmarks, wanted, view.features, grid, predicted)
         if len(matches) < least:
             return None
         pose = refine_pose(

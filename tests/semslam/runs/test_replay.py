@@ -154,7 +154,7 @@ def test_what_cannot_be_replayed_is_one_sentence(semslam: Call, saved: Path, tmp
     for words, complaint in (
         (("--from", tmp_path), "no run folder"),
         (("--from", damaged), "is damaged"),
-        (("--from", nameless), "does not state where its images are"),
+        (("--from", nameless), "does not tell where its images are"),
         (("--from", saved, "--odometry", "dense"), "'odometry' decides the odometry"),
         (("--from", saved, "--config", other), "change them with --set"),
         (("--from", saved, "synthetic:house?frames=30&width=160"), "not the sequence"),
