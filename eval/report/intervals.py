@@ -41,10 +41,10 @@ def draw_intervals(groups: Sequence[tuple[str, Sequence[Bar]]]) -> bytes:
             for place, bar in enumerate(bars):
                 if bar.alone is not None:
                     panel.plot([bar.alone, bar.mean], [place, place], color="#dddddd", linewidth=3, zorder=1)
-                    panel.plot(bar.alone, place, "|", color=ODOMETRY, markersize=11, markeredgewidth=2)
+                    panel.plot(bar.alone, place, "|", color=ODOMETRY.color, markersize=11, markeredgewidth=2)
                 if bar.low is not None and bar.high is not None:
-                    panel.plot([bar.low, bar.high], [place, place], color=OPTIMISED, linewidth=2)
-                marker, color = ("o", OPTIMISED) if bar.ours else ("D", TRUTH)
+                    panel.plot([bar.low, bar.high], [place, place], color=OPTIMISED.color, linewidth=2)
+                marker, color = ("o", OPTIMISED.color) if bar.ours else ("D", TRUTH.color)
                 panel.plot(bar.mean, place, marker, color=color, markersize=6)
             panel.set_yticks(range(len(bars)), [bar.label for bar in bars])
             panel.set_ylim(len(bars) - 0.5, -0.5)

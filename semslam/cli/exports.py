@@ -10,7 +10,7 @@ from semslam.cli import options
 from semslam.cli.command import Command, example
 from semslam.cli.console import out, remarks
 from semslam.cli.progress import bar
-from semslam.errors import ConfigError, ResultsError
+from semslam.errors import ResultsError
 
 if TYPE_CHECKING:
     from semslam.runs.results import SavedRun
@@ -96,16 +96,12 @@ def _trajectory(source: Path, rate: float | None) -> "Trajectory":
 
 
 def _write_images(run: "SavedRun", target: Target, directory: Path, sequence: str | None) -> int:
-    from semslam.datasets import open_dataset
     from semslam.runs.export.colmap import write_colmap
     from semslam.runs.export.nerfstudio import write_nerfstudio
     from semslam.runs.files import writing
-    from semslam.runs.recording import read_source
+    from semslam.runs.saved_views import open_saved
 
-    source = sequence or read_source(run.directory)
-    if source is None:
-        raise ConfigError("The run does not state where its images are; name the sequence with --sequence.")
-    dataset = open_dataset(source, run.config.dataset)
+    dataset = open_saved(run.directory, sequence).dataset
     with writing(directory):
         if directory.exists() and any(directory.iterdir()):
             raise ResultsError(f"{directory} is not empty; name another folder with --out.")

@@ -85,7 +85,7 @@ class ProcessWorker(Worker[Job, Answer]):
     """
 
     def __init__(self, make: Make[Job, Answer]) -> None:
-        from joblib.externals.cloudpickle import dumps
+        from cloudpickle import dumps
         from joblib.externals.loky.backend import get_context
 
         self._pool = ProcessPoolExecutor(max_workers=1, mp_context=get_context("loky"), initializer=_obey_the_parent)

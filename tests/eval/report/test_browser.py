@@ -111,7 +111,7 @@ def test_rejected_and_withdrawn_candidates_are_shown_too(run_page: Visit) -> Non
         assert page.locator("#loops tbody tr").count() == 1
         page.locator("#loops tbody tr").click()
         assert kind in (page.locator("#loop-reason").text_content() or "")
-        assert page.locator("#pictures image").count() == 2
+        assert page.locator("#pictures image").count() == 4, "both frames, each with its mask"
         page.keyboard.press("Escape")
 
 

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from semslam.runs.manifest import seal
 from tests.conftest import Call
 
 METRICS = {
@@ -18,7 +19,7 @@ METRICS = {
 
 @pytest.fixture
 def run(tmp_path: Path) -> Path:
-    (tmp_path / "metrics.json").write_text(json.dumps(METRICS))
+    seal(tmp_path, json.dumps(METRICS))
     return tmp_path
 
 
@@ -50,7 +51,7 @@ def test_json_says_the_same(semslam: Call, run: Path) -> None:
 
 
 def test_an_interrupted_run_fails(semslam: Call, run: Path) -> None:
-    (run / "metrics.json").write_text(json.dumps(METRICS | {"interrupted": True}))
+    seal(run, json.dumps(METRICS | {"interrupted": True}))
     assert semslam("check", run, "--max-ate", 1).code == 1
 
 

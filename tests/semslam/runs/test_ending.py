@@ -20,13 +20,14 @@ ROOT = Path(__file__).resolve().parents[3]
 ALONE = Config(detector="none")
 
 SCRIPT = """
-import os, sys
+import os, signal, sys
 from dataclasses import dataclass
 import semslam.datasets
 import semslam.runs.results as results
 from semslam.cli import main
 from tests.conftest import WallDataset
 
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a test run in the background of a shell ignores it
 number, moment, out = int(sys.argv[1]), sys.argv[2], sys.argv[3]
 
 def twice():
