@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from semslam import __version__
 from semslam.config import Config
 from semslam.datasets.dataset import Dataset
 from semslam.eval.metrics import ERRORS
@@ -66,6 +67,7 @@ def run_report(run: SavedRun, dataset: Dataset | None) -> RunReport:
         stages=tuple(StageTime(name, value) for name, value in metrics.time.stages_ms.items()),
         resources=_resources(metrics),
         changes=changed_settings(run.config),
+        origin=(Fact("page written by", f"semslam {__version__}"),),
         notes=run.notes,
         settings=run.config.dump(),
     )
