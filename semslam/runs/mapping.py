@@ -24,7 +24,6 @@ class MapRequest:
     """Which maps are wanted.
 
     Attributes:
-        voxel: side of a cell in metres.
         voxel: side of a cell in metres; None = that of each kind of map.
         mesh: whether to fuse a mesh.
         semantic: whether to fuse labels and find objects.

@@ -24,7 +24,7 @@ class RunResult:
         ledger: one entry per loop candidate.
         metrics: all figures.
         recording: what the front end made of the sequence, for a replay.
-        notes: what was mended or left out, a sentence each.
+        notes: what was corrected or left out, a sentence each.
     """
 
     config: Config

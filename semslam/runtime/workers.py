@@ -89,7 +89,7 @@ class ProcessWorker(Worker[Job, Answer]):
         from joblib.externals.loky.backend import get_context
 
         self._pool = ProcessPoolExecutor(max_workers=1, mp_context=get_context("loky"), initializer=_obey_the_parent)
-        self._ready: Future[None] = self._pool.submit(_prepare, dumps(make))
+        self._pool.submit(_prepare, dumps(make))
 
     def submit(self, job: Job) -> "Future[Answer]":
         """See ``Worker``."""
@@ -138,7 +138,7 @@ def make_worker(kind: WorkerKind, make: Make[Job, Answer]) -> Worker[Job, Answer
     return ThreadWorker(make) if kind is WorkerKind.THREAD else InlineWorker(make)
 
 
-_prepared: list[Callable[[Any], Any] | SemslamError] = []
+_prepared: list[Callable[[Any], Any] | Exception] = []
 """In a worker's process: the function that does its work, or why there is none."""
 
 
@@ -156,15 +156,15 @@ def _end_with(parent: int) -> None:
 
 
 def _prepare(pickled: bytes) -> None:
-    make: Make[Any, Any] = pickle.loads(pickled)
     try:
+        make: Make[Any, Any] = pickle.loads(pickled)
         _prepared.append(make())
-    except SemslamError as error:
+    except Exception as error:  # whatever a plug-in raises; the first job hands it to the caller
         _prepared.append(error)
 
 
 def _work(job: Any) -> Any:
     (work,) = _prepared
-    if isinstance(work, SemslamError):
+    if isinstance(work, Exception):
         raise work
     return work(job)

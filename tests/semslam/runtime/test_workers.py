@@ -52,6 +52,17 @@ def test_jobs_are_done_in_order_and_errors_come_back(kind: WorkerKind) -> None:
     worker.close()
 
 
+def broken() -> Callable[[int], int]:
+    raise RuntimeError("A plug-in's own error.")
+
+
+def test_a_process_hands_on_whatever_its_work_fails_with() -> None:
+    worker = make_worker(WorkerKind.PROCESS, broken)
+    with pytest.raises(RuntimeError, match="plug-in's own"):
+        answer_of(worker.submit(1))
+    worker.close()
+
+
 @pytest.mark.parametrize("kind", WorkerKind)
 def test_work_that_cannot_be_made_is_an_error_of_ours(kind: WorkerKind) -> None:
     with pytest.raises(ModelError, match="no weights"):
