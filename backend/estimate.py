@@ -7,7 +7,7 @@ import gtsam
 from semslam.backend.graph.factors import ANCHOR_SIGMA, between_factor, prior_factor, read_poses
 from semslam.backend.graph.products import Edge, GraphSolution
 from semslam.backend.steps import Steps
-from semslam.types import FloatArray
+from semslam.types import FloatArray, Transform
 
 RELINEARIZE = 0.02
 """Radians and metres a pose must move before its factors are linearised again."""
@@ -49,12 +49,12 @@ class RunningEstimate:
     def __contains__(self, key: int) -> bool:
         return bool(self._values.exists(key) or self._isam.valueExists(key))
 
-    def place(self, key: int, T_world_cam: FloatArray) -> None:
+    def place(self, key: int, T_world_cam: Transform) -> None:
         """Give a new keyframe a pose (4, 4) to start from."""
         self._values.insert(key, gtsam.Pose3(T_world_cam))
         self._placed += 1
 
-    def hold(self, key: int, T_world_cam: FloatArray, sigma: float) -> None:
+    def hold(self, key: int, T_world_cam: Transform, sigma: float) -> None:
         """Hold a keyframe at a pose (4, 4) with a standard deviation in radians and metres."""
         self._factors.add(prior_factor(key, T_world_cam, sigma))
 
@@ -111,10 +111,10 @@ class RunningEstimate:
         """The current pose (4, 4) of one keyframe."""
         found = self._values if self._values.exists(key) else None
         pose = self._isam.calculateEstimatePose3(key) if found is None else found.atPose3(key)
-        T_world_cam: FloatArray = pose.matrix()
+        T_world_cam: Transform = pose.matrix()
         return T_world_cam
 
-    def poses(self) -> dict[int, FloatArray]:
+    def poses(self) -> dict[int, Transform]:
         """The poses of all keyframes that an update has taken in."""
         values = self._isam.calculateEstimate()
         return read_poses(values, values.keys())

@@ -13,7 +13,7 @@ from semslam.backend.steps import Steps, finish
 from semslam.config import BackendConfig
 from semslam.errors import GraphError
 from semslam.geometry.se3 import invert
-from semslam.types import FloatArray, LoopConstraint
+from semslam.types import FloatArray, LoopConstraint, Transform
 
 FIRST_RETRY, RETRY_SHARE = 5, 0.05
 """Waiting loops, and share of all loops, at which all are judged together; then again when they have doubled."""
@@ -187,7 +187,7 @@ class IncrementalPoseGraph:
         """
         return self.pose(key) @ invert(self._graph.start(key))
 
-    def poses(self) -> dict[int, FloatArray]:
+    def poses(self) -> dict[int, Transform]:
         """All current poses by key; takes time in proportion to their number."""
         return self._estimate.poses()
 

@@ -31,7 +31,7 @@ from semslam.backend.robust.strategy import (
 from semslam.backend.steps import Steps
 from semslam.config import BackendConfig
 from semslam.geometry.se3 import invert
-from semslam.types import FloatArray, LoopConstraint, RejectionReason
+from semslam.types import LoopConstraint, RejectionReason, Transform
 
 SLACK = 2.25
 """How much farther odometry's deviations may be widened than short cycles ask for: a bias grows with the way."""
@@ -49,8 +49,8 @@ class GraphProblem:
         covisible: further edges that are trusted, between keyframes that see the same landmarks.
     """
 
-    poses: Mapping[int, FloatArray]
-    priors: Mapping[int, FloatArray]
+    poses: Mapping[int, Transform]
+    priors: Mapping[int, Transform]
     odometry: Sequence[Edge]
     constraints: Sequence[LoopConstraint]
     covisible: Sequence[Edge] = ()
@@ -59,7 +59,7 @@ class GraphProblem:
         """The key that holds a component: the first with a prior, or else the first."""
         return next((key for key in component if key in self.priors), component[0])
 
-    def anchored(self, poses: Mapping[int, FloatArray], component: Sequence[int]) -> dict[int, FloatArray]:
+    def anchored(self, poses: Mapping[int, Transform], component: Sequence[int]) -> dict[int, Transform]:
         """A component's poses, moved rigidly so that its anchor stands where it should."""
         key = self.anchor(component)
         move = self.priors.get(key, self.poses[key]) @ invert(poses[key])
@@ -83,7 +83,7 @@ def optimize_graph(
     strategy = build_strategy(config)
     edges = [loop_edge(constraint) for constraint in problem.constraints]
     maps = sorted(connected_components(problem.poses, problem.odometry))
-    start: dict[int, FloatArray] = {}
+    start: dict[int, Transform] = {}
     for component in maps:
         start.update(problem.anchored(problem.poses, component))
     start = place_components(start, maps, edges)
@@ -113,14 +113,14 @@ def _solution(
     problem: GraphProblem,
     edges: Sequence[Edge],
     verdicts: tuple[LoopVerdict, ...],
-    poses: Mapping[int, FloatArray],
+    poses: Mapping[int, Transform],
     scales: tuple[float, float],
     cost: float,
 ) -> GraphSolution:
     """Poses and loops as they are handed out: maps that only false loops had moved go back to their own anchors."""
     kept = [edge for edge, verdict in zip(edges, verdicts, strict=True) if verdict.accepted]
     components = connected_components(problem.poses, [*problem.odometry, *kept])
-    home: dict[int, FloatArray] = {}
+    home: dict[int, Transform] = {}
     for component in components:
         home.update(problem.anchored(poses, component))
     return GraphSolution(
@@ -160,7 +160,7 @@ def _screen(
 
 
 def _trusted(
-    problem: GraphProblem, maps: Sequence[Sequence[int]], start: Mapping[int, FloatArray], odometry: Sequence[Edge]
+    problem: GraphProblem, maps: Sequence[Sequence[int]], start: Mapping[int, Transform], odometry: Sequence[Edge]
 ) -> gtsam.NonlinearFactorGraph:
     graph = gtsam.NonlinearFactorGraph()
     for index, component in enumerate(maps):
@@ -176,7 +176,7 @@ def _judge(
     result: RobustSolution,
     loops: Sequence[Edge],
     screening: Screening,
-    poses: Mapping[int, FloatArray],
+    poses: Mapping[int, Transform],
     limit: float,
 ) -> tuple[LoopVerdict, ...]:
     """A verdict for each loop; one is accepted that has weight and a residual of at most ``limit``."""

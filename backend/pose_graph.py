@@ -10,7 +10,7 @@ from semslam.backend.steps import Steps, finish
 from semslam.config import BackendConfig
 from semslam.errors import GraphError
 from semslam.geometry.poses import PoseLike
-from semslam.types import FloatArray, LoopConstraint
+from semslam.types import FloatArray, LoopConstraint, Transform
 
 __all__ = ["Edge", "GraphSolution", "LoopVerdict", "PoseGraph", "PosedGraph"]
 
@@ -26,8 +26,8 @@ class PoseGraph:
 
     def __init__(self, config: BackendConfig | None = None) -> None:
         self._config = config or BackendConfig()
-        self._poses: dict[int, FloatArray] = {}
-        self._priors: dict[int, FloatArray] = {}
+        self._poses: dict[int, Transform] = {}
+        self._priors: dict[int, Transform] = {}
         self._odometry: dict[tuple[int, int], Edge] = {}
         self._covisible: dict[tuple[int, int], Edge] = {}
         self._loops: dict[tuple[int, int], LoopConstraint] = {}

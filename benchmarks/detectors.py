@@ -36,7 +36,7 @@ from semslam.loop.detector import LoopDetector
 from semslam.loop.segmentation.build import build_segmenter
 from semslam.loop.verification.icp import IcpVerifier
 from semslam.studies.detectors import compare_detectors, exhaustive_detector, keyframe_views
-from semslam.types import FloatArray, Frame, KeyframeView, LoopConstraint
+from semslam.types import Frame, KeyframeView, LoopConstraint, Transforms
 
 NAMES = "fused,semantic,semantic-paper,dbow,sda,cnnw,conv3,thumbnail,hog,gist"
 PARTS = "precision,calibration,changes,verified,mixed,speed"
@@ -236,7 +236,7 @@ def print_verified(dataset: Dataset, names: list[str], every: int) -> None:
     print()
 
 
-def is_accurate(loop: LoopConstraint, poses: FloatArray, row: int) -> bool:
+def is_accurate(loop: LoopConstraint, poses: Transforms, row: int) -> bool:
     error = invert(invert(poses[loop.candidate.match]) @ poses[row]) @ loop.T_match_query
     return bool(np.linalg.norm(error[:3, 3]) <= 0.20 and rotation_angle(error) <= np.radians(10))
 

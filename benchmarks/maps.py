@@ -42,7 +42,7 @@ from semslam.maps.semantic.semantic_map import SemanticMap, build_semantic_map
 from semslam.maps.views import PosedView, sample
 from semslam.runs.differences import find_changes
 from semslam.runs.saved_views import SavedViews, open_saved
-from semslam.types import Cloud, FloatArray, IntArray, LabelMap, UInt8Array
+from semslam.types import Cloud, FloatArray, IntArray, LabelMap, Points3, Transform, UInt8Array
 
 MARGIN = 0.15
 NEAR, FAR = 0.3, 1.0
@@ -90,7 +90,7 @@ class Objects:
     invented: int
 
 
-def rows_of(built: SemanticMap, points: FloatArray) -> IntArray:
+def rows_of(built: SemanticMap, points: Points3) -> IntArray:
     """The map's row of each point (N, 3) that its views were made of."""
     order = np.argsort(built.keys)
     return order[np.searchsorted(built.keys[order], voxel_keys(points, built.voxel))]
@@ -133,7 +133,7 @@ def labels_table(built: SemanticMap, views: Sequence[PosedView], single: Remembe
             )
 
 
-def compare_objects(found: Sequence[MapObject], true: Sequence[MapObject], T: FloatArray) -> Objects:
+def compare_objects(found: Sequence[MapObject], true: Sequence[MapObject], T: Transform) -> Objects:
     """Match objects of the run, moved by ``T`` (4, 4) into the true world, to the true ones, the nearest first."""
     pairs = [
         (float(np.linalg.norm(T[:3, :3] @ a.centroid + T[:3, 3] - b.centroid)), a.id, b.id)

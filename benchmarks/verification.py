@@ -25,7 +25,7 @@ from semslam.eval.loops.truth import ANGLE_TOLERANCE, POSE_TOLERANCE, LoopTruth,
 from semslam.eval.nees import nees
 from semslam.eval.trajectory import poses_at
 from semslam.frontend.keyframes import KeyframeBuilder
-from semslam.geometry.se3 import FloatArray, invert, rotation_angle
+from semslam.geometry.se3 import FloatArray, Transforms, invert, rotation_angle
 from semslam.loop.detector import LoopDetector
 from semslam.loop.segmentation.build import build_segmenter
 from semslam.loop.verification.icp import IcpVerifier
@@ -44,7 +44,7 @@ class Part:
 
     name: str
     first: int
-    poses: FloatArray
+    poses: Transforms
     truth: LoopTruth
     loops: list[LoopConstraint]
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from semslam.errors import TrajectoryError
-from semslam.geometry.se3 import FloatArray, log_so3
+from semslam.geometry.se3 import FloatArray, Transform, log_so3
 
 DEGREES_OF_FREEDOM = 6
 
@@ -29,7 +29,7 @@ def nees(errors: FloatArray, covariances: FloatArray) -> FloatArray:
     return np.asarray(values)
 
 
-def _log(T: FloatArray) -> FloatArray:
+def _log(T: Transform) -> FloatArray:
     """Tangent vector (6,) of a transform, rotation first."""
     rotation = log_so3(T[:3, :3])
     angle = float(np.linalg.norm(rotation))

@@ -10,7 +10,14 @@ import numpy.typing as npt
 
 from semslam.errors import TrajectoryError
 from semslam.eval.metrics import Comparison, TrajectoryMetrics, rms
-from semslam.geometry.se3 import FloatArray, invert, quaternions_to_rotations, rotations_to_quaternions
+from semslam.geometry.se3 import (
+    FloatArray,
+    Transform,
+    Transforms,
+    invert,
+    quaternions_to_rotations,
+    rotations_to_quaternions,
+)
 from semslam.types import Trajectory
 
 MAX_DIFFERENCE = 0.02
@@ -38,10 +45,10 @@ class Pairs:
 class Similarity:
     """An alignment p -> scale * R p + t, with R and t in ``T`` (4, 4)."""
 
-    T: FloatArray
+    T: Transform
     scale: float
 
-    def apply(self, poses: FloatArray) -> FloatArray:
+    def apply(self, poses: Transforms) -> Transforms:
         """Move poses (N, 4, 4): positions by the similarity, rotations by R alone."""
         scaled = poses.copy()
         scaled[:, :3, 3] *= self.scale
@@ -223,7 +230,7 @@ def _nearest(sorted_stamps: FloatArray, wanted: FloatArray) -> npt.NDArray[np.in
     return np.where(closer, before, after)
 
 
-def _tripods(poses: FloatArray) -> FloatArray:
+def _tripods(poses: Transforms) -> FloatArray:
     feet = TRIPOD * np.concatenate([np.zeros((1, 3)), np.eye(3)])
     return np.asarray(poses[:, None, :3, 3] + feet @ np.swapaxes(poses[:, :3, :3], 1, 2)).reshape(-1, 3)
 

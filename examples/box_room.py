@@ -5,14 +5,14 @@ from collections.abc import Iterator
 import numpy as np
 
 from semslam import Frame, Intrinsics
-from semslam.geometry.se3 import FloatArray, exp_so3, make_transform
+from semslam.geometry.se3 import FloatArray, Transforms, exp_so3, make_transform
 
 CAMERA = Intrinsics(320, 240, 260.0, 260.0, 159.5, 119.5)
 HALF_SIZE = np.array([2.5, 1.4, 2.0])  # metres from the middle to the walls
 TILE = 0.06  # metres
 
 
-def poses(count: int = 48, turns: int = 2) -> FloatArray:
+def poses(count: int = 48, turns: int = 2) -> Transforms:
     """Poses (N, 4, 4) T_world_cam; y points down."""
     angles = 2 * np.pi * turns * np.arange(count) / count
     places = 0.4 * np.stack([np.sin(angles), 0.1 * np.sin(3 * angles), np.cos(angles)], -1)

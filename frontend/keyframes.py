@@ -8,7 +8,7 @@ import numpy as np
 from semslam.config import Config, KeyframeConfig
 from semslam.features import FeatureExtractor
 from semslam.frontend.surface import make_cloud
-from semslam.geometry.se3 import FloatArray, invert, orthonormalise, rotation_angle
+from semslam.geometry.se3 import Transform, invert, orthonormalise, rotation_angle
 from semslam.types import Frame, Keyframe, Motion, TrackingStatus
 
 STAMP_TOLERANCE = 1e-3
@@ -28,7 +28,7 @@ class TrackedPose:
 
     index: int
     timestamp: float
-    T_odom_cam: FloatArray
+    T_odom_cam: Transform
     map_id: int
 
 
@@ -110,7 +110,7 @@ class KeyframeBuilder:
         self._last = self._pose
         return self.build_at(frame, self._pose.T_odom_cam, self._pose.map_id)
 
-    def build_at(self, frame: Frame, T_odom_cam: FloatArray, map_id: int = 0) -> Keyframe:
+    def build_at(self, frame: Frame, T_odom_cam: Transform, map_id: int = 0) -> Keyframe:
         """Make a frame whose pose is known from elsewhere a keyframe: features and a thinned cloud stay, no images.
 
         Keyframes are numbered from 0 in the order in which they are built.

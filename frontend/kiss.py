@@ -7,7 +7,7 @@ import numpy as np
 from semslam.config import Config, Section, setting
 from semslam.frontend.prediction import ConstantVelocity, RecentVelocity, check_frame, first_motion
 from semslam.geometry.se3 import invert, is_rigid, rotation_angle
-from semslam.types import FloatArray, Frame, Motion, TrackingStatus
+from semslam.types import FloatArray, Frame, Motion, Points3, TrackingStatus, Transform
 
 ALONG_SURFACE = 0.03
 """A point's information along its surface as a share of that across it: small, but edges constrain a little."""
@@ -78,7 +78,7 @@ class KissOdometry:
         departure = self._recent.departure(timestamp, moved)
         return Motion(moved, self._covariance(source, departure), status, self._map_id, len(source))
 
-    def _lose(self, timestamp: float, T_odom_prev: FloatArray, points: FloatArray) -> Motion:
+    def _lose(self, timestamp: float, T_odom_prev: Transform, points: Points3) -> Motion:
         if not self._started:
             self._started = True
             self._prediction.tracked(timestamp, np.eye(4))
@@ -120,7 +120,7 @@ class KissOdometry:
         return registration + np.outer(departure, departure)
 
 
-def _normals(points: FloatArray) -> FloatArray:
+def _normals(points: Points3) -> FloatArray:
     """Unit normals (N, 3) of the surface that points (N, 3) lie on."""
     import open3d as o3d
 

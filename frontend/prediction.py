@@ -6,7 +6,7 @@ import numpy as np
 
 from semslam.errors import DatasetError
 from semslam.geometry.se3 import exp_so3, make_transform, tangent
-from semslam.types import FloatArray, Frame, Motion, TrackingStatus
+from semslam.types import FloatArray, Frame, Motion, TrackingStatus, Transform
 
 COAST_SECONDS = 0.3
 """How long a lost camera is taken to keep its velocity; after that it is taken to rest."""
@@ -35,7 +35,7 @@ class ConstantVelocity:
         step = self._velocity * (timestamp - self._timestamp)
         return make_transform(exp_so3(step[:3]), step[3:])
 
-    def tracked(self, timestamp: float, T_prev_cur: FloatArray) -> None:
+    def tracked(self, timestamp: float, T_prev_cur: Transform) -> None:
         """Take in a measured motion from the last frame to the one at ``timestamp``."""
         elapsed = timestamp - self._timestamp if self._timestamp is not None else 0.0
         known = elapsed > 0 and self._timestamp == self._tracked_at
@@ -58,7 +58,7 @@ class RecentVelocity:
         self._last: float | None = None
         self._velocities: deque[tuple[float, FloatArray]] = deque()
 
-    def departure(self, timestamp: float, T_prev_cur: FloatArray) -> FloatArray:
+    def departure(self, timestamp: float, T_prev_cur: Transform) -> FloatArray:
         """How far a motion since the last frame departs from it, (6,) in radians and metres; then take it in.
 
         Nothing where there is no motion to compare it with.

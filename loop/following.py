@@ -7,7 +7,7 @@ import numpy as np
 
 from semslam.config import LoopConfig
 from semslam.geometry.se3 import invert, transform_points
-from semslam.types import FloatArray, Keyframe, LoopCandidate, LoopConstraint, LoopEvidence, Verification
+from semslam.types import FloatArray, Keyframe, LoopCandidate, LoopConstraint, LoopEvidence, Transform, Verification
 
 GAP_SHARE = 0.5
 """Share of ``loops.min_gap`` that must lie between followed frames, which earlier loops support."""
@@ -33,7 +33,7 @@ class LoopFollower:
 
     def __init__(self, config: LoopConfig) -> None:
         self._config = config
-        self._poses: list[FloatArray] = []
+        self._poses: list[Transform] = []
         self._frames: list[int] = []  # which keyframe's map each pose is in: poses of different maps do not compare
         self._tried: set[int] = set()
         self._waiting: deque[LoopCandidate] | None = None

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from semslam.config import KeypointConfig
 from semslam.geometry.camera import Intrinsics
 from semslam.geometry.reprojection import measure, refine_pose, squared_errors
-from semslam.geometry.se3 import Float32Array, FloatArray, invert, make_transform
+from semslam.geometry.se3 import Covariance6, Float32Array, Transform, invert, make_transform
 from semslam.types import Features, Frame, IntArray, UInt8Array
 
 PATCH = 31
@@ -151,9 +151,9 @@ class PnpResult:
         covariance: (6, 6) of T_ref_cam.
     """
 
-    T_ref_cam: FloatArray
+    T_ref_cam: Transform
     inliers: npt.NDArray[np.bool_]
-    covariance: FloatArray
+    covariance: Covariance6
 
 
 def solve_pnp(

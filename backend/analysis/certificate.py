@@ -17,7 +17,7 @@ from scipy.sparse.linalg import SuperLU, splu
 
 from semslam.backend.graph.products import Edge, GraphSolution
 from semslam.geometry.se3 import orthonormalise
-from semslam.types import FloatArray
+from semslam.types import FloatArray, Transforms
 
 LARGEST_GAP = 1e-3
 """How much more than the bound poses may cost, as a share of it, to be called the optimum."""
@@ -109,7 +109,7 @@ def _dual_matrix(Q: sparse.csc_matrix, X: FloatArray) -> sparse.csc_matrix:
     return (Q - _sparse_blocks(np.arange(count), np.arange(count), multipliers, count)).tocsc()
 
 
-def _poses(X: FloatArray) -> FloatArray:
+def _poses(X: FloatArray) -> Transforms:
     """(N, 3, 4) of (3, 4N)."""
     return X.reshape(3, -1, 4).transpose(1, 0, 2)
 

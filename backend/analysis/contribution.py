@@ -17,7 +17,7 @@ from semslam.backend.graph.factors import (
 from semslam.backend.graph.products import GraphSolution
 from semslam.backend.robust.least_squares import optimise
 from semslam.config import BackendConfig
-from semslam.types import FloatArray, LoopConstraint
+from semslam.types import LoopConstraint, Transform
 
 HOLD_SIGMA = 10.0
 """Radians and metres: keeps a part that only one loop joins to the rest determined when that loop is left out."""
@@ -39,8 +39,8 @@ class Contribution:
     constraint: LoopConstraint
     tension: float
     shift_m: float
-    poses: dict[int, FloatArray]
-    poses_with: dict[int, FloatArray]
+    poses: dict[int, Transform]
+    poses_with: dict[int, Transform]
 
 
 def leave_one_out(solution: GraphSolution, config: BackendConfig) -> Iterator[Contribution]:
@@ -91,6 +91,6 @@ def _linear_graph(factors: list[gtsam.GaussianFactor]) -> gtsam.GaussianFactorGr
     return graph
 
 
-def _shift(poses: dict[int, FloatArray], reference: dict[int, FloatArray]) -> float:
+def _shift(poses: dict[int, Transform], reference: dict[int, Transform]) -> float:
     moved = np.stack([poses[key][:3, 3] - reference[key][:3, 3] for key in reference])
     return float(np.sqrt((moved**2).sum(1).mean()))

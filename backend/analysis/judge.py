@@ -7,7 +7,7 @@ from semslam.backend.graph.products import Edge, GraphSolution, PosedGraph
 from semslam.backend.pose_graph import PoseGraph
 from semslam.config import BackendConfig
 from semslam.errors import GraphError
-from semslam.types import FloatArray, LoopCandidate, LoopConstraint
+from semslam.types import LoopCandidate, LoopConstraint, Transform
 
 
 def judge_graph(graph: PosedGraph, config: BackendConfig) -> GraphSolution:
@@ -61,7 +61,7 @@ def constraint_of(edge: Edge, detector: str = "file") -> LoopConstraint:
 
 
 def rebuilt(
-    poses: Mapping[int, FloatArray],
+    poses: Mapping[int, Transform],
     odometry: Sequence[Edge],
     loops: Sequence[LoopConstraint],
     anchors: Sequence[int],

@@ -4,7 +4,7 @@ import numpy as np
 
 from semslam.backend.graph.products import Edge
 from semslam.geometry.se3 import exp_so3, invert, make_transform
-from semslam.types import FloatArray
+from semslam.types import FloatArray, Transform
 
 SIGMAS = np.array([0.005] * 3 + [0.01] * 3)
 """Standard deviations of a simulated measurement: radians, then metres."""
@@ -19,7 +19,7 @@ def ring(count: int = 40, laps: int = 2, radius: float = 2.0) -> FloatArray:
     return np.stack(poses)
 
 
-def noisy(T: FloatArray, rng: np.random.Generator, scale: float = 1.0, sigmas: FloatArray = SIGMAS) -> FloatArray:
+def noisy(T: Transform, rng: np.random.Generator, scale: float = 1.0, sigmas: FloatArray = SIGMAS) -> Transform:
     """A transform (4, 4) with Gaussian noise of ``scale`` times ``sigmas`` (6,) at its right end."""
     x = rng.normal(size=6) * sigmas * scale
     return T @ make_transform(exp_so3(x[:3]), x[3:])

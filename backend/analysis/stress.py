@@ -12,7 +12,7 @@ from semslam.backend.graph.products import Edge, GraphSolution, PosedGraph
 from semslam.config import BackendConfig
 from semslam.errors import ConfigError, GraphError
 from semslam.geometry.se3 import exp_so3, invert, make_transform
-from semslam.types import FloatArray, LoopConstraint
+from semslam.types import FloatArray, LoopConstraint, Transform
 
 GROUP = 6
 """False loops in one consistent group."""
@@ -159,7 +159,7 @@ def _look_alike(
         yield Edge(match, query, T_match_query, covariance)
 
 
-def _by_odometry(graph: PosedGraph, odometry: Sequence[Edge]) -> dict[int, FloatArray]:
+def _by_odometry(graph: PosedGraph, odometry: Sequence[Edge]) -> dict[int, Transform]:
     """Poses as odometry alone has them; each chain starts where the graph has its first keyframe."""
     chain = OdometryChain(graph.poses, odometry)
     return {key: graph.poses[start] @ T_start_key for key, start, T_start_key in chain.poses()}

@@ -25,7 +25,7 @@ from semslam.backend.graph.products import Edge
 from semslam.backend.robust.least_squares import optimise
 from semslam.config import BundleConfig
 from semslam.errors import GraphError
-from semslam.types import FloatArray, Intrinsics, Observations
+from semslam.types import FloatArray, Intrinsics, Observations, Transform
 
 TOLERANCE = 1e-4
 """Relative change of the cost at which a round ends."""
@@ -58,13 +58,13 @@ class BundleResult:
         landmarks: how many landmarks were adjusted.
     """
 
-    poses: dict[int, FloatArray]
+    poses: dict[int, Transform]
     rounds: tuple[BundleRound, ...]
     landmarks: int
 
 
 def adjust(
-    poses: Mapping[int, FloatArray],
+    poses: Mapping[int, Transform],
     observations: Mapping[int, Observations],
     intrinsics: Intrinsics,
     config: BundleConfig,
@@ -160,7 +160,7 @@ def _noises(sigma: float, config: BundleConfig) -> tuple[gtsam.noiseModel.Robust
 
 
 def _pose_factors(
-    poses: Mapping[int, FloatArray], edges: Sequence[Edge], observation_share: float
+    poses: Mapping[int, Transform], edges: Sequence[Edge], observation_share: float
 ) -> gtsam.NonlinearFactorGraph:
     """The edges, tightened by as much as observations count less: so the outlier threshold stays in pixels."""
     graph = gtsam.NonlinearFactorGraph()

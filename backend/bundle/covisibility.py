@@ -14,7 +14,7 @@ from semslam.config import CovisibilityConfig
 from semslam.features import lift
 from semslam.geometry.reprojection import measure, refine_pose
 from semslam.geometry.se3 import invert
-from semslam.types import FloatArray, Intrinsics, Observations
+from semslam.types import FloatArray, Intrinsics, Observations, Transform
 
 GATE = 7.815
 """Chi-square of three degrees of freedom at 95 %: observations farther off are left out of a registration."""
@@ -32,11 +32,11 @@ class Covisibility:
     def __init__(self, config: CovisibilityConfig) -> None:
         self._config = config
         self._seen: dict[int, Observations] = {}
-        self._poses: dict[int, FloatArray] = {}
+        self._poses: dict[int, Transform] = {}
         self._observers: defaultdict[int, list[int]] = defaultdict(list)
 
     def add(
-        self, key: int, T_odom_cam: FloatArray, observations: Observations, intrinsics: Intrinsics
+        self, key: int, T_odom_cam: Transform, observations: Observations, intrinsics: Intrinsics
     ) -> tuple[Edge, ...]:
         """Take in a keyframe and give the edges from older ones to it.
 

@@ -7,7 +7,7 @@ import gtsam
 import numpy as np
 
 from semslam.geometry.se3 import invert, transform_points
-from semslam.types import FloatArray, IntArray, Intrinsics, Observations
+from semslam.types import FloatArray, IntArray, Intrinsics, Observations, Points3, Transform
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,7 +29,7 @@ class ObservationTable:
     pixels: FloatArray
     depths: FloatArray
     sigmas: FloatArray
-    points: FloatArray
+    points: Points3
     local: FloatArray
 
     def __len__(self) -> int:
@@ -40,14 +40,14 @@ class ObservationTable:
         depths = np.where(self.depths > 0, self.depths, 1.0)
         return self.pixels[:, 0] - intrinsics.fx * baseline / depths
 
-    def moved(self, poses: Mapping[int, FloatArray], values: gtsam.Values) -> "ObservationTable":
+    def moved(self, poses: Mapping[int, Transform], values: gtsam.Values) -> "ObservationTable":
         """The same observations of landmarks and keyframes that have moved."""
         points = np.stack([values.atPoint3(gtsam.symbol("l", row)) for row in range(len(self.points))])
         return replace(self, points=points, local=_local(poses, self.keys, points[self.landmarks]))
 
 
 def gather(
-    poses: Mapping[int, FloatArray],
+    poses: Mapping[int, Transform],
     observations: Mapping[int, Observations],
     intrinsics: Intrinsics,
     min_views: int,
@@ -132,7 +132,7 @@ _NOTHING = ObservationTable(
 
 
 def _starting_points(
-    poses: Mapping[int, FloatArray],
+    poses: Mapping[int, Transform],
     keys: IntArray,
     rows: IntArray,
     pixels: FloatArray,
@@ -152,7 +152,7 @@ def _starting_points(
     return np.column_stack([np.bincount(rows, weights * world[:, axis]) / total for axis in range(3)])
 
 
-def _local(poses: Mapping[int, FloatArray], keys: IntArray, world: FloatArray) -> FloatArray:
+def _local(poses: Mapping[int, Transform], keys: IntArray, world: FloatArray) -> FloatArray:
     local = np.zeros_like(world)
     for key in np.unique(keys):
         local[keys == key] = transform_points(invert(poses[int(key)]), world[keys == key])

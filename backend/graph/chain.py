@@ -9,7 +9,7 @@ import numpy.typing as npt
 from semslam.backend.graph.keys import chain_of
 from semslam.backend.graph.products import Edge
 from semslam.geometry.se3 import invert, orthonormalise, rotation_angle
-from semslam.types import FloatArray, IntArray
+from semslam.types import Covariance6, FloatArray, IntArray, Transforms
 
 BoolArray = npt.NDArray[np.bool_]
 
@@ -73,7 +73,7 @@ class OdometryChain:
         return np.searchsorted(self._keys, np.asarray(keys).ravel()).astype(np.int64)
 
 
-def adjoints(T: FloatArray) -> FloatArray:
+def adjoints(T: Transforms) -> FloatArray:
     """Adjoints (L, 6, 6) of transforms (L, 4, 4), rotation first."""
     out = np.zeros((len(T), 6, 6))
     R, t = T[:, :3, :3], T[:, :3, 3]
@@ -84,7 +84,7 @@ def adjoints(T: FloatArray) -> FloatArray:
     return out
 
 
-def deviations(T: FloatArray) -> FloatArray:
+def deviations(T: Transforms) -> FloatArray:
     """Rotation vectors and translations (L, 6) of small transforms (L, 4, 4)."""
     R = T[:, :3, :3]
     axis = np.stack([R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]], -1)
@@ -92,6 +92,6 @@ def deviations(T: FloatArray) -> FloatArray:
     return np.hstack([axis * (rotation_angle(T) / length)[:, None], T[:, :3, 3]])
 
 
-def squared_mahalanobis(deviation: FloatArray, covariance: FloatArray) -> FloatArray:
+def squared_mahalanobis(deviation: FloatArray, covariance: Covariance6) -> FloatArray:
     """Squared Mahalanobis lengths (L,) of deviations (L, 6) under covariances (L, 6, 6)."""
     return np.asarray((deviation * np.linalg.solve(covariance, deviation[..., None])[..., 0]).sum(-1))

@@ -6,7 +6,7 @@ import numpy as np
 
 from semslam.backend.graph.products import Edge
 from semslam.geometry.se3 import invert, rotation_angle
-from semslam.types import FloatArray
+from semslam.types import FloatArray, Transform
 
 SAME_PLACE_M = 0.5
 SAME_PLACE_RAD = 0.35
@@ -37,8 +37,8 @@ def connected(keys: Iterable[int], pairs: Iterable[tuple[int, int]]) -> list[tup
 
 
 def place_components(
-    poses: Mapping[int, FloatArray], components: Sequence[tuple[int, ...]], loops: Sequence[Edge]
-) -> dict[int, FloatArray]:
+    poses: Mapping[int, Transform], components: Sequence[tuple[int, ...]], loops: Sequence[Edge]
+) -> dict[int, Transform]:
     """Move each component rigidly to where most loops to an already placed one want it.
 
     Each loop between the two is a hypothesis of the move; the one nearest to all the others wins, far ones
@@ -53,7 +53,7 @@ def place_components(
     home = {key: index for index, component in enumerate(components) for key in component}
     done = {0}
     while True:
-        moves: dict[int, list[FloatArray]] = {}
+        moves: dict[int, list[Transform]] = {}
         for loop in loops:
             a, b = home[loop.from_key], home[loop.to_key]
             if (a in done) == (b in done):

@@ -8,7 +8,7 @@ import numpy as np
 from semslam.backend.graph.checks import checked_covariance, checked_pose
 from semslam.backend.graph.products import Edge
 from semslam.errors import GraphError
-from semslam.types import FloatArray
+from semslam.types import Transform
 
 ANCHOR_SIGMA = 1e-4
 """Radians and metres: how firmly the first keyframe is held."""
@@ -16,7 +16,7 @@ FLOATING_SIGMA = 1e3
 """Radians and metres: how firmly further maps are held; enough to be solvable, too little to pull on a loop."""
 
 
-def prior_factor(key: int, T_world_cam: FloatArray, sigma: float) -> gtsam.PriorFactorPose3:
+def prior_factor(key: int, T_world_cam: Transform, sigma: float) -> gtsam.PriorFactorPose3:
     """Hold a keyframe at a pose with an isotropic standard deviation in radians and metres."""
     return gtsam.PriorFactorPose3(key, gtsam.Pose3(T_world_cam), gtsam.noiseModel.Isotropic.Sigma(6, sigma))
 
@@ -62,7 +62,7 @@ def read_edges(graph: gtsam.NonlinearFactorGraph) -> list[Edge]:
     return edges
 
 
-def make_values(poses: Mapping[int, FloatArray]) -> gtsam.Values:
+def make_values(poses: Mapping[int, Transform]) -> gtsam.Values:
     """GTSAM values of poses (4, 4) by key."""
     values = gtsam.Values()
     for key, T_world_cam in poses.items():
@@ -70,12 +70,12 @@ def make_values(poses: Mapping[int, FloatArray]) -> gtsam.Values:
     return values
 
 
-def read_poses(values: gtsam.Values, keys: Iterable[int]) -> dict[int, FloatArray]:
+def read_poses(values: gtsam.Values, keys: Iterable[int]) -> dict[int, Transform]:
     """Poses (4, 4) by key out of GTSAM values."""
     return {key: values.atPose3(key).matrix() for key in keys}
 
 
-def mahalanobis(edge: Edge, poses: Mapping[int, FloatArray]) -> float:
+def mahalanobis(edge: Edge, poses: Mapping[int, Transform]) -> float:
     """Mahalanobis distance between an edge and the poses it joins, as GTSAM's between-factor measures it."""
     predicted = gtsam.Pose3(poses[edge.from_key]).between(gtsam.Pose3(poses[edge.to_key]))
     error = gtsam.Pose3.Logmap(gtsam.Pose3(edge.T_from_to).between(predicted))

@@ -19,7 +19,7 @@ from semslam.backend.graph.products import Edge, GraphSolution, PosedGraph
 from semslam.errors import GraphError, SemslamError, printable, shortened
 from semslam.files import read_text
 from semslam.geometry.se3 import compose, make_transform, quaternions_to_rotations, rotations_to_quaternions
-from semslam.types import FloatArray
+from semslam.types import FloatArray, Transform
 
 TRIANGLE = np.triu_indices(6)
 SWAPPED = [3, 4, 5, 0, 1, 2]
@@ -61,7 +61,7 @@ def read_g2o(path: Path) -> PosedGraph:
     Raises:
         GraphError: the file cannot be read, is no 3-D pose graph, or a line is malformed; the message names it.
     """
-    poses: dict[int, FloatArray] = {}
+    poses: dict[int, Transform] = {}
     edges: list[Edge] = []
     anchors: list[int] = []
     passed_over: Counter[str] = Counter()
@@ -155,7 +155,7 @@ def _edge(tag: str, words: list[str], where: str) -> Edge:
     return Edge(from_key, to_key, T_from_to, checked_covariance(covariance, where), is_loop=tag == SWITCHABLE)
 
 
-def _chain(poses: dict[int, FloatArray], edges: list[Edge]) -> None:
+def _chain(poses: dict[int, Transform], edges: list[Edge]) -> None:
     for edge in edges:
         if edge.to_key not in poses:
             start = poses.setdefault(edge.from_key, np.eye(4))
@@ -163,6 +163,6 @@ def _chain(poses: dict[int, FloatArray], edges: list[Edge]) -> None:
         poses.setdefault(edge.from_key, np.eye(4))
 
 
-def _pose_text(T: FloatArray) -> str:
+def _pose_text(T: Transform) -> str:
     numbers = [*T[:3, 3], *rotations_to_quaternions(T[:3, :3])[0]]
     return " ".join(repr(float(value)) for value in numbers)

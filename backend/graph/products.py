@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 
 from semslam.backend.graph.checks import checked_covariance, checked_pose
-from semslam.types import FloatArray, LoopConstraint, RejectionReason
+from semslam.types import Covariance6, LoopConstraint, RejectionReason, Transform
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -20,8 +20,8 @@ class Edge:
 
     from_key: int
     to_key: int
-    T_from_to: FloatArray
-    covariance: FloatArray
+    T_from_to: Transform
+    covariance: Covariance6
     is_loop: bool = False
 
     def widened(self, factor: float) -> "Edge":
@@ -40,7 +40,7 @@ class PosedGraph:
         notes: what of the file was read in another way or left out, a sentence each.
     """
 
-    poses: dict[int, FloatArray]
+    poses: dict[int, Transform]
     edges: tuple[Edge, ...]
     anchors: tuple[int, ...] = ()
     notes: tuple[str, ...] = ()
@@ -83,7 +83,7 @@ class GraphSolution:
         covisible: edges between keyframes that see the same landmarks, which took part beside ``edges``.
     """
 
-    poses: dict[int, FloatArray]
+    poses: dict[int, Transform]
     verdicts: tuple[LoopVerdict, ...]
     edges: tuple[Edge, ...]
     anchors: tuple[int, ...]

@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from semslam.eval.trajectory import BoolArray, poses_at
 from semslam.geometry.camera import Intrinsics
-from semslam.geometry.se3 import Float32Array, FloatArray, invert, rotation_angle, transform_points
+from semslam.geometry.se3 import Float32Array, FloatArray, Transform, invert, rotation_angle, transform_points
 from semslam.types import JudgedLoop, Keyframe, LoopConstraint, LoopJudgement, Trajectory
 
 STEP = 16
@@ -87,7 +87,7 @@ def make_view(depth: Float32Array, intrinsics: Intrinsics) -> DepthView:
     return DepthView(points.astype(np.float32), millimetres, ideal)
 
 
-def overlap_between(a: DepthView, b: DepthView, T_a_b: FloatArray) -> tuple[float, float]:
+def overlap_between(a: DepthView, b: DepthView, T_a_b: Transform) -> tuple[float, float]:
     """Shares of a's points that b sees, and of b's points that a sees; 0 for a view without points."""
     in_b = _sees(b, transform_points(invert(T_a_b), a.points))
     in_a = _sees(a, transform_points(T_a_b, b.points))

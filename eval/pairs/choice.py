@@ -17,7 +17,7 @@ from semslam.eval.loops.truth import TRUE_OVERLAP, LoopTruth
 from semslam.eval.pairs.changes import LIGHT, MIN_OBJECT, Change, change_frame
 from semslam.eval.pairs.judging import Pair, PairGroup
 from semslam.eval.trajectory import BoolArray
-from semslam.geometry.se3 import FloatArray, invert, rotation_angle
+from semslam.geometry.se3 import FloatArray, Transforms, invert, rotation_angle
 from semslam.types import Frame
 
 PAIRS_PER_GROUP = 50
@@ -52,7 +52,7 @@ class PosedFrames:
     """
 
     read: Reader
-    poses: FloatArray
+    poses: Transforms
     truth: LoopTruth
     min_gap: float = 5.0
     variants: Mapping[PairGroup, Sequence[Variant]] = field(default_factory=dict)

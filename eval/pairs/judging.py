@@ -14,7 +14,7 @@ import numpy as np
 from semslam.errors import ConfigError
 from semslam.eval.loops.precision_recall import Scorer
 from semslam.eval.trajectory import BoolArray
-from semslam.geometry.se3 import FloatArray
+from semslam.geometry.se3 import FloatArray, Transform, Transforms
 from semslam.types import Frame, KeyframeView
 
 # Seconds between the stamps of handed-out frames: far enough for every detector's idea of "the same moment".
@@ -45,7 +45,7 @@ class Pair:
     kind: str
     same_place: bool
     load: Callable[[int], Frame]
-    poses: FloatArray
+    poses: Transforms
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -81,7 +81,7 @@ class PairQuality:
 class ViewMaker(Protocol):
     """Makes what detectors see out of a frame: features, and labels where they are needed."""
 
-    def __call__(self, identity: int, frame: Frame, T_world_cam: FloatArray) -> KeyframeView:
+    def __call__(self, identity: int, frame: Frame, T_world_cam: Transform) -> KeyframeView:
         """The view of keyframe ``identity``."""
 
 

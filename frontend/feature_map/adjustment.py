@@ -21,7 +21,7 @@ from semslam.geometry.reprojection import (
     retract,
 )
 from semslam.geometry.se3 import orthonormalise
-from semslam.types import FloatArray, IntArray
+from semslam.types import FloatArray, IntArray, Points3, Transforms
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,9 +39,9 @@ class BundleProblem:
         gate: weighted squared residual from which a observation counts as an outlier.
     """
 
-    poses: FloatArray
+    poses: Transforms
     free: int
-    points: FloatArray
+    points: Points3
     pose_of: IntArray
     point_of: IntArray
     seen: Measurements
@@ -89,7 +89,7 @@ class BundleAdjustment:
         else:
             self._damping = min(self._damping * 10.0, 1e4)
 
-    def _evaluated(self, poses: FloatArray, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _evaluated(self, poses: Transforms, points: Points3) -> tuple[FloatArray, FloatArray]:
         """Points (3, O) in the cameras that see them, and residuals (3, O)."""
         world = points[self._problem.point_of]
         camera_points = np.empty((3, len(world)))
@@ -97,7 +97,7 @@ class BundleAdjustment:
             camera_points[:, part] = into_camera(T_map_cam, world[part])
         return camera_points, self._problem.seen.stereo - project_stereo(camera_points, self._problem.camera)
 
-    def _robust_cost(self, camera_points: FloatArray, residual: FloatArray) -> float:
+    def _robust_cost(self, camera_points: Points3, residual: FloatArray) -> float:
         gate = self._problem.gate
         errors = gated_errors(residual, self._problem.seen.weights, camera_points[2])
         errors = np.minimum(errors[self._active], 1e6)

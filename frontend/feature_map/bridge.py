@@ -4,7 +4,7 @@ from typing import Protocol
 
 from semslam.frontend.frame_to_frame.dense import DenseConfig, DenseRegistrar
 from semslam.frontend.frame_to_frame.reference import Registration
-from semslam.types import FloatArray, Frame
+from semslam.types import Frame, Transform
 
 
 class Bridge(Protocol):
@@ -13,7 +13,7 @@ class Bridge(Protocol):
     def note(self, frame: Frame) -> None:
         """Remember a frame as the one before the next."""
 
-    def register(self, frame: Frame, T_prev_cur: FloatArray) -> Registration | None:
+    def register(self, frame: Frame, T_prev_cur: Transform) -> Registration | None:
         """Motion since the noted frame from an initial guess, or None where the two do not match."""
 
 
@@ -23,7 +23,7 @@ class NoBridge:
     def note(self, frame: Frame) -> None:
         """Remember nothing."""
 
-    def register(self, frame: Frame, T_prev_cur: FloatArray) -> Registration | None:
+    def register(self, frame: Frame, T_prev_cur: Transform) -> Registration | None:
         """None."""
         del frame, T_prev_cur
         return None
@@ -41,7 +41,7 @@ class DenseBridge:
         """Remember a frame as the one before the next."""
         self._previous = frame
 
-    def register(self, frame: Frame, T_prev_cur: FloatArray) -> Registration | None:
+    def register(self, frame: Frame, T_prev_cur: Transform) -> Registration | None:
         """Motion since the noted frame; None after a gap in time or where too few pixels agree."""
         previous = self._previous
         if previous is None or frame.timestamp - previous.timestamp > self._max_seconds:

@@ -6,7 +6,7 @@ import numpy as np
 
 from semslam.frontend.feature_map.landmarks import Landmarks
 from semslam.geometry.reprojection import NEAREST
-from semslam.geometry.se3 import FloatArray
+from semslam.geometry.se3 import FloatArray, Transform
 from semslam.types import Features, IntArray, Intrinsics, UInt8Array
 
 MAX_HAMMING = 64
@@ -77,7 +77,7 @@ class Prediction:
         scale: factor between pyramid levels.
     """
 
-    T_map_cam: FloatArray
+    T_map_cam: Transform
     camera: Intrinsics
     radius: float
     scale: float

@@ -7,7 +7,7 @@ import numpy as np
 from semslam.frontend.feature_map.landmarks import NONE, Landmarks
 from semslam.geometry.reprojection import Measurements
 from semslam.geometry.se3 import transform_points
-from semslam.types import Features, FloatArray, IntArray
+from semslam.types import Features, IntArray, Transform
 
 
 @dataclass(slots=True, eq=False)
@@ -23,7 +23,7 @@ class MapKeyframe:
     """
 
     id: int
-    T_map_cam: FloatArray
+    T_map_cam: Transform
     features: Features
     measured: Measurements
     map_id: int
@@ -54,7 +54,7 @@ class LocalMap:
         return self._observations[keyframe, : len(self.keyframes[keyframe].features)]
 
     def add_keyframe(
-        self, T_map_cam: FloatArray, features: Features, measured: Measurements, observations: IntArray, map_id: int
+        self, T_map_cam: Transform, features: Features, measured: Measurements, observations: IntArray, map_id: int
     ) -> MapKeyframe:
         """Add a keyframe with the landmarks (N,) its keypoints were matched to."""
         keyframe = MapKeyframe(len(self.keyframes), T_map_cam, features, measured, map_id)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from semslam.frontend.feature_map.guided import KeypointGrid, Matches, Prediction, match_guided
 from semslam.frontend.feature_map.local_map import LocalMap
 from semslam.geometry.reprojection import Measurements, PoseEstimate, refine_pose
-from semslam.types import Features, FloatArray, IntArray, Intrinsics
+from semslam.types import Covariance6, Features, FloatArray, IntArray, Intrinsics, Transform
 
 GATE = 7.815
 """Chi-square of three degrees of freedom at 95 %."""
@@ -42,8 +42,8 @@ class Located:
         in_view: identities of the landmarks that should have been seen.
     """
 
-    T_map_cam: FloatArray
-    covariance: FloatArray
+    T_map_cam: Transform
+    covariance: Covariance6
     landmarks: IntArray
     keypoints: IntArray
     in_view: IntArray
@@ -52,7 +52,7 @@ class Located:
 def locate(
     the_map: LocalMap,
     view: View,
-    T_map_cam: FloatArray,
+    T_map_cam: Transform,
     wanted: IntArray,
     radii: tuple[float, ...],
     scale: float,

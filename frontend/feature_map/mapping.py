@@ -9,7 +9,7 @@ from semslam.frontend.feature_map.map_pose import GATE, View
 from semslam.frontend.feature_map.settings import FeatureMapConfig
 from semslam.geometry.reprojection import Measurements
 from semslam.geometry.se3 import invert, transform_points
-from semslam.types import FloatArray, IntArray
+from semslam.types import IntArray, Transform
 
 YOUNG = 3
 """Keyframes within which a new landmark must have been observed again."""
@@ -24,7 +24,7 @@ class Mapper:
         self._running: _WindowAdjustment | None = None
 
     def insert(
-        self, view: View, T_map_cam: FloatArray, landmarks: IntArray, keypoints: IntArray, map_id: int
+        self, view: View, T_map_cam: Transform, landmarks: IntArray, keypoints: IntArray, map_id: int
     ) -> MapKeyframe:
         """Make a keyframe of a frame whose keypoints were matched to landmarks; new landmarks come from the rest."""
         self.finish()

@@ -18,7 +18,7 @@ from semslam.frontend.prediction import ConstantVelocity, check_frame, first_mot
 from semslam.geometry.reprojection import measure
 from semslam.geometry.se3 import invert, rotation_angle, transform_points
 from semslam.runtime.threads import one_blas_thread
-from semslam.types import Features, FloatArray, Frame, IntArray, Motion, Observations, TrackingStatus
+from semslam.types import Features, FloatArray, Frame, IntArray, Motion, Observations, TrackingStatus, Transform
 
 NOTHING: IntArray = np.zeros(0, dtype=np.int64)
 
@@ -115,7 +115,7 @@ class FeatureMapOdometry:
             return self._T_reported
         return self._reference.T_map_cam @ self._T_ref_prev
 
-    def _locate(self, view: View, T_map_cam: FloatArray, wanted: IntArray, *radii: float) -> Located | None:
+    def _locate(self, view: View, T_map_cam: Transform, wanted: IntArray, *radii: float) -> Located | None:
         return locate(self._map, view, T_map_cam, wanted, radii, self._scale, self._config.min_inliers)
 
     def _locate_coarsely(self, view: View, guess: FloatArray) -> Located | None:
@@ -144,7 +144,7 @@ class FeatureMapOdometry:
         keyframes = self._map.covisible(landmarks, self._map_id)[: self._config.local_keyframes]
         return self._map.seen_from(keyframes)
 
-    def _accept(self, view: View, raw: Features, found: Located, T_map_prev: FloatArray) -> Motion:
+    def _accept(self, view: View, raw: Features, found: Located, T_map_prev: Transform) -> Motion:
         covariance = found.covariance * self._config.covariance_scale
         status = TrackingStatus.OK if len(found.landmarks) >= self._config.sure_inliers else TrackingStatus.DEGRADED
         if self._lost_since is not None:
@@ -177,7 +177,7 @@ class FeatureMapOdometry:
             points, measured, raw.pixels[found.keypoints, 1], view.camera, view.velocity, self._readout.seconds
         )
 
-    def _cross(self, frame: Frame, view: View, T_map_prev: FloatArray) -> Motion:
+    def _cross(self, frame: Frame, view: View, T_map_prev: Transform) -> Motion:
         """Where the frame does not match the map, use another kind of registration, if there is one and it succeeds."""
         found = None
         if self._lost_since is None and self._reference is not None:
@@ -227,7 +227,7 @@ class FeatureMapOdometry:
             or len(found.landmarks) < self._config.insert_share * depths
         )
 
-    def _insert(self, view: View, T_map_cam: FloatArray, landmarks: IntArray, keypoints: IntArray) -> None:
+    def _insert(self, view: View, T_map_cam: Transform, landmarks: IntArray, keypoints: IntArray) -> None:
         self._reference = self._mapper.insert(view, T_map_cam, landmarks, keypoints, self._map_id)
         self._T_ref_prev = np.eye(4)
         self._keyframe_time = view.timestamp

@@ -7,7 +7,7 @@ import numpy as np
 from semslam.features import hamming_distances, match_descriptors, solve_pnp
 from semslam.frontend.feature_map.local_map import LocalMap
 from semslam.frontend.feature_map.map_pose import View
-from semslam.types import FloatArray, IntArray
+from semslam.types import FloatArray, IntArray, Transform
 
 SAMPLE = 200
 """Keypoints of the frame that vote."""
@@ -24,7 +24,7 @@ MATCH_RATIO = 0.85
 class Place:
     """Where a frame may be: a pose (4, 4) in a map, near some keyframes."""
 
-    T_map_cam: FloatArray
+    T_map_cam: Transform
     map_id: int
     keyframes: IntArray
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from semslam.geometry.reprojection import Measurements, pose_jacobians, project_stereo
 from semslam.geometry.se3 import tangent
-from semslam.types import Features, FloatArray, Intrinsics
+from semslam.types import Features, FloatArray, Intrinsics, Points3, Transform
 
 FASTEST = 0.04
 """Seconds; no read-out is longer than a frame at 25 Hz."""
@@ -24,7 +24,7 @@ TRUST = 1e-2
 """Factor on a frame's information: landmarks were themselves made with the estimated read-out, which hides errors."""
 
 
-def velocity_of(T_prev_cur: FloatArray, seconds: float) -> FloatArray:
+def velocity_of(T_prev_cur: Transform, seconds: float) -> FloatArray:
     """Angular and linear velocity (6,) of a camera that moved by T_prev_cur (4, 4) in a time."""
     return tangent(T_prev_cur) / max(seconds, 1e-3)
 
@@ -80,7 +80,7 @@ class ReadoutEstimate:
 
     def learn(
         self,
-        points_cam: FloatArray,
+        points_cam: Points3,
         rectified: Measurements,
         pixels_v: FloatArray,
         camera: Intrinsics,

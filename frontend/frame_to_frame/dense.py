@@ -11,7 +11,7 @@ from semslam.frontend.frame_to_frame.reference import ReferenceOdometry, Registr
 from semslam.geometry.camera import Intrinsics
 from semslam.geometry.se3 import adjoint, invert, is_rigid
 from semslam.runtime.threads import one_open3d_thread
-from semslam.types import FloatArray, Frame
+from semslam.types import Frame, Transform
 
 MIN_SIZE = 32
 """Pixels; smaller images have no pyramid."""
@@ -71,7 +71,7 @@ class DenseRegistrar:
         rgbd = o3d.t.geometry.RGBDImage(image(tensor(color.astype(np.float32) / 255.0)), image(tensor(depth)))
         return DenseView(rgbd, frame.intrinsics)
 
-    def register(self, reference: DenseView, current: DenseView, T_ref_cam: FloatArray) -> Registration | None:
+    def register(self, reference: DenseView, current: DenseView, T_ref_cam: Transform) -> Registration | None:
         """Register ``current`` to ``reference`` from an initial guess; None where too few pixels agree."""
         import open3d as o3d
 

@@ -7,7 +7,7 @@ from semslam.config import Config
 from semslam.frontend.frame_to_frame.dense import DenseConfig, DenseOdometry, DenseRegistrar, DenseView
 from semslam.frontend.frame_to_frame.feature import FeatureRegistrar, FeatureView
 from semslam.frontend.frame_to_frame.reference import Reach, ReferenceOdometry, Registration
-from semslam.types import FloatArray, Frame
+from semslam.types import Frame, Transform
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -25,7 +25,7 @@ class _Registrar:
         dense = self._dense.prepare(frame)
         return None if dense is None else _View(dense, self._features.prepare(frame))
 
-    def register(self, reference: _View, current: _View, T_ref_cam: FloatArray) -> Registration | None:
+    def register(self, reference: _View, current: _View, T_ref_cam: Transform) -> Registration | None:
         if reference.features is not None and current.features is not None:
             matched = self._features.register(reference.features, current.features, T_ref_cam)
             T_ref_cam = T_ref_cam if matched is None else matched.T_ref_cam

@@ -8,7 +8,7 @@ import numpy as np
 from semslam.config import Config, Section, setting
 from semslam.features import FeatureExtractor, match_descriptors, solve_pnp
 from semslam.frontend.frame_to_frame.reference import ReferenceOdometry, Registration
-from semslam.types import Features, FloatArray, Frame, Intrinsics
+from semslam.types import Features, Frame, Intrinsics, Transform
 
 
 class FeatureOdometryConfig(Section):
@@ -42,7 +42,7 @@ class FeatureRegistrar:
             return None
         return FeatureView(features, frame.intrinsics)
 
-    def register(self, reference: FeatureView, current: FeatureView, T_ref_cam: FloatArray) -> Registration | None:
+    def register(self, reference: FeatureView, current: FeatureView, T_ref_cam: Transform) -> Registration | None:
         """Register ``current`` to ``reference``; the guess is not needed. None where too few matches agree."""
         matches = match_descriptors(reference.features.descriptors, current.features.descriptors)
         matches = matches[reference.features.depths[matches[:, 0]] > 0]

@@ -7,7 +7,7 @@ import numpy as np
 
 from semslam.frontend.prediction import ConstantVelocity, check_frame, first_motion
 from semslam.geometry.se3 import invert, rotation_angle
-from semslam.types import FloatArray, Frame, Motion, TrackingStatus
+from semslam.types import Covariance6, FloatArray, Frame, Motion, TrackingStatus, Transform
 
 RESTART_SECONDS = 0.5
 """Seconds without a match after which a usable image becomes the reference of a new map."""
@@ -26,8 +26,8 @@ class Registration:
         degraded: whether the pose is only just supported.
     """
 
-    T_ref_cam: FloatArray
-    covariance: FloatArray
+    T_ref_cam: Transform
+    covariance: Covariance6
     inliers: int
     degraded: bool = False
 
@@ -38,7 +38,7 @@ class Registrar(Protocol[ViewT]):
     def prepare(self, frame: Frame) -> ViewT | None:
         """What is needed of a frame to be tracked, or None where it holds too little."""
 
-    def register(self, reference: ViewT, current: ViewT, T_ref_cam: FloatArray) -> Registration | None:
+    def register(self, reference: ViewT, current: ViewT, T_ref_cam: Transform) -> Registration | None:
         """Register ``current`` to ``reference`` from an initial guess, or None where they do not match."""
 
 

@@ -5,7 +5,7 @@ import numpy as np
 import numpy.typing as npt
 
 from semslam.geometry.camera import Intrinsics
-from semslam.types import Cloud, Float32Array, FloatArray, IntArray
+from semslam.types import Cloud, Float32Array, IntArray, Transform
 
 CELL = 32
 """Pixels of a cell's side; a thinned cloud leaves finer cells empty."""
@@ -14,7 +14,7 @@ TOLERANCE = 0.1
 TOLERANCE_SHARE = 0.03
 
 
-def free_space_violation(seen: Cloud, looking: Cloud, camera: Intrinsics, T_looking_seen: FloatArray) -> float:
+def free_space_violation(seen: Cloud, looking: Cloud, camera: Intrinsics, T_looking_seen: Transform) -> float:
     """Share of points that stand in front of what another view saw in their direction.
 
     Args:

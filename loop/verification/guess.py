@@ -9,7 +9,16 @@ import numpy.typing as npt
 from semslam.features import PnpResult, hamming_distances, lift, mutual_matches, solve_pnp
 from semslam.geometry.camera import Intrinsics
 from semslam.geometry.reprojection import NEAREST, measure, refine_pose, squared_errors
-from semslam.geometry.se3 import Float32Array, FloatArray, invert, make_transform, transform_points
+from semslam.geometry.se3 import (
+    Covariance6,
+    Float32Array,
+    FloatArray,
+    Points3,
+    Transform,
+    invert,
+    make_transform,
+    transform_points,
+)
 from semslam.types import IntArray, Keyframe, NodePair
 
 WIDE, NARROW = 15.0, 8.0
@@ -34,8 +43,8 @@ class Guess:
         source: what it began with, "features" or "nodes".
     """
 
-    T_match_query: FloatArray
-    covariance: FloatArray
+    T_match_query: Transform
+    covariance: Covariance6
     matches: IntArray
     source: str
 
@@ -74,7 +83,7 @@ class FeaturePair:
         """Rows (K, 2) of the query's and of the match's ``Keyframe.finest`` for pairs (K, 2)."""
         return np.column_stack([matches[:, 0], self._deep[matches[:, 1]]])
 
-    def support(self, T_match_query: FloatArray, source: str) -> Guess | None:
+    def support(self, T_match_query: Transform, source: str) -> Guess | None:
         """Look for matches where a pose predicts them, and refine it on those; None where too few agree."""
         T, covariance, matches = T_match_query, np.eye(6), np.zeros((0, 2), dtype=np.int64)
         for radius in (WIDE, NARROW):
@@ -90,12 +99,12 @@ class FeaturePair:
             matches = matches[squared_errors(T, points, seen, self._camera) <= self._gate]
         return Guess(T, covariance, matches, source)
 
-    def errors(self, matches: IntArray, T_match_query: FloatArray) -> FloatArray:
+    def errors(self, matches: IntArray, T_match_query: Transform) -> FloatArray:
         """Pixels (K,) by which matches miss under a pose; infinite for points behind the camera."""
         seen = measure(self._pixels[matches[:, 0]], np.zeros(len(matches)), np.ones(len(matches)))
         return np.sqrt(squared_errors(T_match_query, self._points[matches[:, 1]], seen, self._camera))
 
-    def _guided(self, T_match_query: FloatArray, radius: float) -> IntArray:
+    def _guided(self, T_match_query: Transform, radius: float) -> IntArray:
         """Pairs that are each other's nearest in descriptor among those no farther than ``radius`` in u and v."""
         points = transform_points(invert(T_match_query), self._points)
         ahead = points[:, 2] > NEAREST
@@ -170,7 +179,7 @@ def _triples(count: int, most: int = 300) -> IntArray:
     return np.asarray(rows[:: -(-len(rows) // most)], dtype=np.int64)
 
 
-def _spread(points: FloatArray) -> float:
+def _spread(points: Points3) -> float:
     """Metres by which a third point stands off the line through the farthest two of three."""
     sides = points[[1, 2, 0]] - points
     longest = max(float(np.linalg.norm(sides, axis=1).max()), 1e-9)

@@ -11,6 +11,7 @@ from semslam.loop.verification.free_space import free_space_violation
 from semslam.loop.verification.guess import FeaturePair, Guess, pose_from_nodes
 from semslam.loop.verification.registration import Fit, measure_fit, plane_information, refine
 from semslam.types import (
+    Covariance6,
     FloatArray,
     IntArray,
     Keyframe,
@@ -18,6 +19,7 @@ from semslam.types import (
     LoopConstraint,
     LoopRejection,
     RejectionReason,
+    Transform,
 )
 
 FITNESS_SLACK = 0.95
@@ -39,8 +41,8 @@ class _Estimate:
         overlap: the smaller share of either cloud that lies near the other, 0..1.
     """
 
-    T_match_query: FloatArray
-    covariance: FloatArray
+    T_match_query: Transform
+    covariance: Covariance6
     fit: Fit
     overlap: float
 
@@ -138,12 +140,12 @@ class IcpVerifier:
         return T_pnp, fit_pnp, "pnp"
 
     def _covariance(
-        self, query: Keyframe, match: Keyframe, guess: Guess, T_match_query: FloatArray, fit: Fit, method: str,
+        self, query: Keyframe, match: Keyframe, guess: Guess, T_match_query: Transform, fit: Fit, method: str,
         overlap: float,
     ) -> FloatArray:  # fmt: skip
         """Covariance (6, 6) of T_match_query: formal ones of the parts, widened to what ground truth shows."""
         config = self._config
-        covariance: FloatArray = config.pnp_inflation * guess.covariance
+        covariance: Covariance6 = config.pnp_inflation * guess.covariance
         if method == "icp":
             planes = plane_information(query.cloud, match.cloud, T_match_query, fit.pairs)
             noise = config.icp_inflation * max(fit.rmse, 1e-3) ** 2
@@ -154,7 +156,7 @@ class IcpVerifier:
         covariance = covariance + np.diag(floor)
         return (covariance + covariance.T) / 2
 
-    def _overlap(self, query: Keyframe, match: Keyframe, T_match_query: FloatArray) -> float:
+    def _overlap(self, query: Keyframe, match: Keyframe, T_match_query: Transform) -> float:
         """The smaller of the shares of either cloud that the other one meets."""
         distance = self._config.overlap_distance
         there = measure_fit(query.cloud, match.cloud, T_match_query, distance)

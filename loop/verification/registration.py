@@ -7,7 +7,7 @@ import numpy as np
 
 from semslam.errors import ConfigError
 from semslam.runtime.threads import one_open3d_thread
-from semslam.types import Cloud, FloatArray, IntArray
+from semslam.types import Cloud, FloatArray, IntArray, Transform
 
 MAX_ITERATIONS = 30
 CONVERGED = 1e-4
@@ -39,7 +39,7 @@ class Fit:
 def refine(
     source: Cloud,
     target: Cloud,
-    T_target_source: FloatArray,
+    T_target_source: Transform,
     distances: tuple[float, ...],
     kind: str = "point_to_plane",
 ) -> FloatArray:
@@ -73,7 +73,7 @@ def refine(
     return T
 
 
-def _icp_pass(moving: Any, fixed: Any, T: FloatArray, distance: float, kind: str) -> FloatArray:
+def _icp_pass(moving: Any, fixed: Any, T: Transform, distance: float, kind: str) -> FloatArray:
     from open3d.pipelines import registration as o3d
 
     if kind == "colored" and o3d.evaluate_registration(moving, fixed, distance, T).fitness == 0:
@@ -92,7 +92,7 @@ def _icp_pass(moving: Any, fixed: Any, T: FloatArray, distance: float, kind: str
     return np.array(found.transformation) if found.fitness > 0 else T
 
 
-def measure_fit(source: Cloud, target: Cloud, T_target_source: FloatArray, distance: float) -> Fit:
+def measure_fit(source: Cloud, target: Cloud, T_target_source: Transform, distance: float) -> Fit:
     """Count the source points that lie within ``distance`` metres of the target."""
     from open3d.pipelines import registration
 
@@ -104,7 +104,7 @@ def measure_fit(source: Cloud, target: Cloud, T_target_source: FloatArray, dista
     return Fit(float(found.fitness), float(found.inlier_rmse), pairs)
 
 
-def plane_information(source: Cloud, target: Cloud, T_target_source: FloatArray, pairs: IntArray) -> FloatArray:
+def plane_information(source: Cloud, target: Cloud, T_target_source: Transform, pairs: IntArray) -> FloatArray:
     """Information (6, 6), rotation first, of T_target_source under unit noise along the target's normals.
 
     The Gauss-Newton Hessian of the point-to-plane error in the tangent of the source frame.

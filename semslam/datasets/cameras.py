@@ -10,7 +10,7 @@ import numpy as np
 from semslam.config import DatasetConfig
 from semslam.datasets.camera_file import CAMERA_FILE, CameraSetup, read_camera
 from semslam.geometry.camera import Intrinsics
-from semslam.geometry.se3 import FloatArray, make_transform, orthonormalise
+from semslam.geometry.se3 import Transforms, make_transform, orthonormalise
 
 TUM_DEPTH_SCALE = 5000.0
 KINECT_READOUT = 0.026
@@ -20,7 +20,7 @@ COMMENT_BYTES = 4096
 ROS_DEFAULT = Intrinsics(640, 480, 525.0, 525.0, 319.5, 239.5)
 
 
-def mirror_y(poses: FloatArray) -> FloatArray:
+def mirror_y(poses: Transforms) -> Transforms:
     """Poses (N, 4, 4) of a camera with y up in a left-handed world, as poses of a camera with y down.
 
     Both frames are mirrored, T' = F T F with F = diag(1, -1, 1, 1), so rotations stay rotations.
@@ -29,7 +29,7 @@ def mirror_y(poses: FloatArray) -> FloatArray:
     return np.asarray(poses * flip[:, None] * flip)
 
 
-def bonn_camera_poses(poses: FloatArray) -> FloatArray:
+def bonn_camera_poses(poses: Transforms) -> Transforms:
     """Camera poses (N, 4, 4) of Bonn's ground truth, which follows the markers on the sensor.
 
     The data set's page (https://www.ipb.uni-bonn.de/data/rgbd-dynamic-dataset/) gives T_ROS and T_m with
@@ -59,7 +59,7 @@ class KnownSequence:
     pattern: str
     camera: CameraSetup
     own_name: str | None = None
-    camera_poses: Callable[[FloatArray], FloatArray] | None = None
+    camera_poses: Callable[[Transforms], Transforms] | None = None
     numbered: bool = False
 
 

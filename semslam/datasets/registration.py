@@ -3,11 +3,11 @@
 import numpy as np
 
 from semslam.geometry.camera import Intrinsics
-from semslam.geometry.se3 import Float32Array, FloatArray
+from semslam.geometry.se3 import Float32Array, Transform
 
 
 def register_depth(
-    depth: Float32Array, depth_camera: Intrinsics, T_color_depth: FloatArray, color_camera: Intrinsics
+    depth: Float32Array, depth_camera: Intrinsics, T_color_depth: Transform, color_camera: Intrinsics
 ) -> Float32Array:
     """Warp a depth image into the colour camera; of points that fall on one pixel the nearest stays.
 

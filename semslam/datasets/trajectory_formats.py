@@ -16,6 +16,7 @@ from semslam.errors import TrajectoryError, shortened
 from semslam.files import read_text
 from semslam.geometry.se3 import (
     FloatArray,
+    Transforms,
     is_rigid,
     quaternions_to_rotations,
     rotations_to_quaternions,
@@ -135,7 +136,7 @@ def _read_euroc(path: Path) -> Trajectory:
     return _trajectory(path, rows[:, 0] / 1e9, poses)
 
 
-def _trajectory(path: Path, stamps: FloatArray, poses: FloatArray) -> Trajectory:
+def _trajectory(path: Path, stamps: FloatArray, poses: Transforms) -> Trajectory:
     if not (np.diff(stamps) > 0).all():
         raise TrajectoryError(f"The stamps of {path} do not ascend.")
     if not is_rigid(poses):

@@ -5,7 +5,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 import numpy.typing as npt
 
-from semslam.geometry.se3 import FloatArray
+from semslam.geometry.se3 import Transform
 
 
 @runtime_checkable
@@ -19,7 +19,7 @@ class PoseObject(Protocol):
 PoseLike = npt.ArrayLike | PoseObject
 
 
-def pose_matrix(pose: PoseLike) -> FloatArray:
+def pose_matrix(pose: PoseLike) -> Transform:
     """The matrix of a pose as float64, of whatever shape it was given; nothing else is checked.
 
     Raises:

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from semslam.geometry.camera import Intrinsics
-from semslam.geometry.se3 import FloatArray, exp_so3, make_transform, orthonormalise
+from semslam.geometry.se3 import Covariance6, FloatArray, Points3, Transform, exp_so3, make_transform, orthonormalise
 
 DISPARITY = 40.0
 """Baseline times focal length, pixel metres."""
@@ -53,8 +53,8 @@ class PoseEstimate:
         inliers: (N,) bool, those within the gate.
     """
 
-    T_ref_cam: FloatArray
-    covariance: FloatArray
+    T_ref_cam: Transform
+    covariance: Covariance6
     squared_errors: FloatArray
     inliers: npt.NDArray[np.bool_]
 
@@ -72,13 +72,13 @@ def measure(
     return Measurements(stereo, weights)
 
 
-def into_camera(T_ref_cam: FloatArray, points_ref: FloatArray) -> FloatArray:
+def into_camera(T_ref_cam: Transform, points_ref: Points3) -> Points3:
     """Coordinates (3, N) in a camera of points (N, 3) in the reference frame."""
     R = T_ref_cam[:3, :3]
     return np.asarray(R.T @ points_ref.T - (R.T @ T_ref_cam[:3, 3])[:, None])
 
 
-def project_stereo(points_cam: FloatArray, camera: Intrinsics) -> FloatArray:
+def project_stereo(points_cam: Points3, camera: Intrinsics) -> FloatArray:
     """u, v and disparity (3, N) in pixels of camera-frame points (3, N); meaningful where z > NEAREST."""
     inverse = 1.0 / np.maximum(points_cam[2], NEAREST)
     out = np.empty_like(points_cam)
@@ -88,7 +88,7 @@ def project_stereo(points_cam: FloatArray, camera: Intrinsics) -> FloatArray:
     return out
 
 
-def pose_jacobians(points_cam: FloatArray, camera: Intrinsics) -> FloatArray:
+def pose_jacobians(points_cam: Points3, camera: Intrinsics) -> FloatArray:
     """Derivative (6, 3, N) of ``project_stereo`` by the pose's right tangent, for points (3, N) in view.
 
     T_ref_cam Exp(w, v) moves a camera-frame point p by p x w - v: rows 3 to 5 are thus the negative derivative by p.
@@ -105,12 +105,12 @@ def pose_jacobians(points_cam: FloatArray, camera: Intrinsics) -> FloatArray:
     return J
 
 
-def retract(T: FloatArray, tangent: FloatArray) -> FloatArray:
+def retract(T: Transform, tangent: FloatArray) -> Transform:
     """T times the rotation and translation of a small tangent (6,), rotation first."""
     return np.asarray(T @ make_transform(exp_so3(tangent[:3]), tangent[3:]))
 
 
-def squared_errors(T_ref_cam: FloatArray, points_ref: FloatArray, seen: Measurements, camera: Intrinsics) -> FloatArray:
+def squared_errors(T_ref_cam: Transform, points_ref: Points3, seen: Measurements, camera: Intrinsics) -> FloatArray:
     """Weighted squared residuals (N,) of points (N, 3); infinite for those behind the camera."""
     p = into_camera(T_ref_cam, points_ref)
     return gated_errors(seen.stereo - project_stereo(p, camera), seen.weights, p[2])
@@ -128,8 +128,8 @@ def huber_weights(residual: FloatArray, weights: FloatArray, z: FloatArray, gate
 
 
 def refine_pose(
-    T_ref_cam: FloatArray,
-    points_ref: FloatArray,
+    T_ref_cam: Transform,
+    points_ref: Points3,
     seen: Measurements,
     camera: Intrinsics,
     gate: float,
@@ -176,7 +176,7 @@ def refine_pose(
 
 
 def _gauss_newton(
-    T: FloatArray, points: FloatArray, seen: Measurements, camera: Intrinsics, gate: float
+    T: Transform, points: Points3, seen: Measurements, camera: Intrinsics, gate: float
 ) -> tuple[FloatArray, FloatArray | None]:
     p = into_camera(T, points)
     residual = seen.stereo - project_stereo(p, camera)

@@ -16,10 +16,19 @@ from semslam.errors import TrajectoryError
 FloatArray = npt.NDArray[np.float64]
 Float32Array = npt.NDArray[np.float32]
 
+Transform = FloatArray
+"""(4, 4), rigid."""
+Transforms = FloatArray
+"""(N, 4, 4), rigid."""
+Covariance6 = FloatArray
+"""(6, 6), radians and metres, rotation first."""
+Points3 = FloatArray
+"""(N, 3), metres."""
+
 ORTHONORMAL_TOLERANCE = 1e-3
 
 
-def make_transform(R: npt.ArrayLike, t: npt.ArrayLike) -> FloatArray:
+def make_transform(R: npt.ArrayLike, t: npt.ArrayLike) -> Transform:
     """Join a (3, 3) rotation and a (3,) translation in metres into a (4, 4) transform."""
     T = np.eye(4)
     T[:3, :3] = R
@@ -37,7 +46,7 @@ def invert(T: FloatArray) -> FloatArray:
     return out
 
 
-def transform_points(T_a_b: FloatArray, points_b: npt.NDArray[np.floating]) -> FloatArray:
+def transform_points(T_a_b: Transform, points_b: npt.NDArray[np.floating]) -> Points3:
     """Take points (N, 3) in metres from frame b to frame a."""
     return points_b @ T_a_b[:3, :3].T + T_a_b[:3, 3]
 
@@ -84,7 +93,7 @@ def orthonormalise(T: FloatArray) -> FloatArray:
     return out
 
 
-def is_rigid(T: FloatArray, tolerance: float = ORTHONORMAL_TOLERANCE) -> bool:
+def is_rigid(T: Transform, tolerance: float = ORTHONORMAL_TOLERANCE) -> bool:
     """Whether transforms (..., 4, 4) are finite, orthonormal within ``tolerance`` and right-handed."""
     if T.shape[-2:] != (4, 4) or not np.isfinite(T).all():
         return False
@@ -134,7 +143,7 @@ def rotations_to_quaternions(rotations: FloatArray) -> FloatArray:
     return np.where(q[:, 3:] < 0, -q, q)
 
 
-def compose(motions: Iterable[FloatArray], start: FloatArray) -> FloatArray:
+def compose(motions: Iterable[Transform], start: Transform) -> Transforms:
     """Chain relative motions T_prev_cur onto ``start``: poses (N + 1, 4, 4), re-orthonormalised at each step."""
     poses = [start]
     for motion in motions:
@@ -142,7 +151,7 @@ def compose(motions: Iterable[FloatArray], start: FloatArray) -> FloatArray:
     return np.stack(poses)
 
 
-def adjoint(T: FloatArray) -> FloatArray:
+def adjoint(T: Transform) -> FloatArray:
     """Adjoint (6, 6) of a transform T_a_b: takes tangent vectors (rotation first) of b to a."""
     x, y, z = T[:3, 3]
     out = np.zeros((6, 6))
@@ -151,7 +160,7 @@ def adjoint(T: FloatArray) -> FloatArray:
     return out
 
 
-def interpolate(T_w_a: FloatArray, T_w_b: FloatArray, share: float) -> FloatArray:
+def interpolate(T_w_a: Transform, T_w_b: Transform, share: float) -> Transform:
     """The transform ``share`` (0..1) of the way from a to b: rotation along the shortest arc, translation straight."""
     rotation = exp_so3(share * log_so3(T_w_a[:3, :3].T @ T_w_b[:3, :3]))
     return make_transform(T_w_a[:3, :3] @ rotation, (1.0 - share) * T_w_a[:3, 3] + share * T_w_b[:3, 3])

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from semslam.geometry.se3 import Float32Array, FloatArray, transform_points
+from semslam.geometry.se3 import Float32Array, FloatArray, Points3, Transform, transform_points
 from semslam.geometry.voxels import VoxelTable
 from semslam.maps.ply import write_cloud
 from semslam.maps.views import PosedView, Samples, sample
@@ -61,7 +61,7 @@ def fuse_cloud(views: Iterable[PosedView], voxel: float = VOXEL) -> Cloud:
     return fusion.cloud()
 
 
-def join_clouds(keyframes: Sequence[Keyframe], T_world_cam: Mapping[int, FloatArray], voxel: float = VOXEL) -> Cloud:
+def join_clouds(keyframes: Sequence[Keyframe], T_world_cam: Mapping[int, Transform], voxel: float = VOXEL) -> Cloud:
     """The clouds that keyframes keep, in the world, thinned: no image is read.
 
     Args:
@@ -84,7 +84,7 @@ def join_clouds(keyframes: Sequence[Keyframe], T_world_cam: Mapping[int, FloatAr
     return Cloud(means[:, :3].astype(np.float32), _unit(means[:, 3:6]), np.rint(means[:, 6:]).astype(np.uint8))
 
 
-def write_map(path: Path, keyframes: Sequence[Keyframe], T_world_cam: Mapping[int, FloatArray]) -> None:
+def write_map(path: Path, keyframes: Sequence[Keyframe], T_world_cam: Mapping[int, Transform]) -> None:
     """Write the joined cloud of keyframes, with normals and colours, as PLY.
 
     Args:
@@ -104,7 +104,7 @@ def _colors(keyframes: Sequence[Keyframe]) -> list[UInt8Array]:
     return [np.full((len(c), 3), 128, np.uint8) if c.colors is None else c.colors for c in clouds]
 
 
-def _normals(points: FloatArray, towards: FloatArray, radius: float) -> FloatArray:
+def _normals(points: Points3, towards: FloatArray, radius: float) -> FloatArray:
     """Unit normals (N, 3) of a cloud (N, 3), on the side ``towards`` (N, 3) points to."""
     import open3d as o3d
 

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from semslam.geometry.se3 import Float32Array, FloatArray, transform_points
+from semslam.geometry.se3 import Float32Array, Points3, Transform, transform_points
 from semslam.types import Frame
 
 EDGE = 0.04
@@ -27,7 +27,7 @@ class PosedView:
 
     keyframe: int
     frame: Frame
-    T_world_cam: FloatArray
+    T_world_cam: Transform
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,7 +39,7 @@ class Samples:
         mask: (H, W) bool, which pixels of the image they are, row by row.
     """
 
-    points: FloatArray
+    points: Points3
     mask: npt.NDArray[np.bool_]
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from semslam.errors import ResultsError
 from semslam.frontend.keyframes import EveryNth, KeyframeBuilder
-from semslam.geometry.se3 import FloatArray, interpolate, invert, rotation_angle
+from semslam.geometry.se3 import FloatArray, Transform, interpolate, invert, rotation_angle
 from semslam.loop.detector import NoLoops
 from semslam.loop.search import LoopSearch
 from semslam.runs.saved_views import Progress, SavedViews, silent
@@ -49,7 +49,7 @@ def align_runs(first: SavedViews, second: SavedViews, progress: Progress = silen
     placed = (*first.keyframes, *second.keyframes)
     # The second run comes after the first, far enough for every pair across to be of two visits.
     shift = first.keyframes[-1].timestamp - second.keyframes[0].timestamp + 10 * config.loops.min_gap
-    estimates: list[FloatArray] = []
+    estimates: list[Transform] = []
     for done, view in enumerate(chain(first.read(), second.read()), start=1):
         later = done > len(first.keyframes)
         frame = replace(view.frame, timestamp=view.frame.timestamp + shift) if later else view.frame
@@ -63,7 +63,7 @@ def align_runs(first: SavedViews, second: SavedViews, progress: Progress = silen
     return _agreed(estimates)
 
 
-def _agreed(estimates: Sequence[FloatArray]) -> FloatArray:
+def _agreed(estimates: Sequence[Transform]) -> FloatArray:
     """The middle of the largest set of transforms (4, 4) that lie near one of them."""
     best: list[FloatArray] = []
     for T in estimates:
@@ -78,6 +78,6 @@ def _agreed(estimates: Sequence[FloatArray]) -> FloatArray:
     return middle
 
 
-def _is_near(T_a: FloatArray, T_b: FloatArray) -> bool:
+def _is_near(T_a: Transform, T_b: Transform) -> bool:
     apart = invert(T_a) @ T_b
     return bool(np.linalg.norm(apart[:3, 3]) <= NEAR_M and rotation_angle(apart) <= NEAR_RAD)

@@ -10,7 +10,7 @@ from semslam.backend.graph.products import GraphSolution
 from semslam.config import BackendConfig
 from semslam.errors import TrajectoryError
 from semslam.eval.trajectory import Pairs, associate, rmse_after_alignment
-from semslam.types import FloatArray, Keyframe, LoopContribution, Trajectory
+from semslam.types import Keyframe, LoopContribution, Trajectory, Transform
 
 
 def loop_contributions(
@@ -56,11 +56,11 @@ class _KeyframeError:
         key_at = {keyframe.timestamp: keyframe.id for keyframe in inside}
         self._keys = [key_at[stamp] for stamp in self._pairs.timestamps.tolist()]
 
-    def difference(self, poses: Mapping[int, FloatArray], reference: Mapping[int, FloatArray]) -> float | None:
+    def difference(self, poses: Mapping[int, Transform], reference: Mapping[int, Transform]) -> float | None:
         """By how many metres the ATE of ``poses`` is larger than that of ``reference``."""
         if self._pairs is None:
             return None
         return self._ate(self._pairs, poses) - self._ate(self._pairs, reference)
 
-    def _ate(self, pairs: Pairs, poses: Mapping[int, FloatArray]) -> float:
+    def _ate(self, pairs: Pairs, poses: Mapping[int, Transform]) -> float:
         return rmse_after_alignment(replace(pairs, estimated=np.stack([poses[key] for key in self._keys])))

@@ -12,13 +12,13 @@ from semslam.maps.semantic.semantic_map import VOXEL, build_semantic_map
 from semslam.maps.views import PosedView
 from semslam.runs.files import write_json
 from semslam.runs.saved_views import Progress, SavedViews, silent
-from semslam.types import FloatArray
+from semslam.types import Transform
 
 
 def find_changes(
     before: SavedViews,
     after: SavedViews,
-    T_before_after: FloatArray | None = None,
+    T_before_after: Transform | None = None,
     voxel: float | None = None,
     progress: Progress = silent,
 ) -> tuple[Change, ...]:

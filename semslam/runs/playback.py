@@ -11,7 +11,7 @@ from semslam.maps.cloud import join_clouds
 from semslam.runs.recording import RecordedFrame
 from semslam.runs.saved_views import Progress, SavedViews, silent
 from semslam.system.result import FrameState
-from semslam.types import FloatArray, Keyframe, LoopOutcome
+from semslam.types import Keyframe, LoopOutcome, Transform
 from semslam.viewers.viewer import FinishedRun, KeyframeScene, LoopScene, ShownLoop, Viewer, aligned_truth
 
 
@@ -53,14 +53,14 @@ def play(saved: SavedViews, viewer: Viewer, progress: Progress = silent) -> None
 
 
 def _state(
-    recorded: RecordedFrame, T_odom_cam: FloatArray, live: Mapping[float, FloatArray], keyframe: int | None
+    recorded: RecordedFrame, T_odom_cam: Transform, live: Mapping[float, Transform], keyframe: int | None
 ) -> FrameState:
     """A frame as it was when it was done."""
     T_world_cam = live.get(recorded.timestamp, T_odom_cam)
     return FrameState(recorded.index, recorded.timestamp, recorded.motion, T_odom_cam, T_world_cam, keyframe)
 
 
-def _live_poses(directory: Path) -> dict[float, FloatArray]:
+def _live_poses(directory: Path) -> dict[float, Transform]:
     """The poses (4, 4) as they stood when each frame was done, by stamp; none of a run that did not keep them."""
     file = directory / "live.txt"
     if not file.exists():

@@ -10,7 +10,7 @@ from semslam.errors import DatasetError, ResultsError
 from semslam.maps.views import PosedView
 from semslam.runs.recording import Recording, read_front_end
 from semslam.runs.results import SavedRun, read_run
-from semslam.types import FloatArray
+from semslam.types import Transform
 
 Progress = Callable[[int, int], None]
 
@@ -26,7 +26,7 @@ class PlacedKeyframe:
     id: int
     frame: int
     timestamp: float
-    T_world_cam: FloatArray
+    T_world_cam: Transform
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -24,7 +24,7 @@ from semslam.eval.pairs.judging import (
 from semslam.eval.pairs.reader import read_pair_folder
 from semslam.eval.trajectory import poses_at
 from semslam.frontend.keyframes import KeyframeBuilder
-from semslam.geometry.se3 import FloatArray, invert
+from semslam.geometry.se3 import FloatArray, Transform, invert
 from semslam.loop.detectors.fused.detector import FusedConfig
 from semslam.loop.segmentation.build import build_segmenter
 from semslam.studies.detectors import PROBABILISTIC, check_scorable, exhaustive_detector
@@ -165,7 +165,7 @@ def _scores(
     segmenter = build_segmenter(config) if any(d.needs_labels for d in detectors.values()) else None
     builder = KeyframeBuilder(config, details=False)
 
-    def make(identity: int, frame: Frame, T_world_cam: FloatArray) -> KeyframeView:
+    def make(identity: int, frame: Frame, T_world_cam: Transform) -> KeyframeView:
         report(title, identity, 2 * len(pairs))
         keyframe = builder.build_at(frame, T_world_cam)
         labels = None if segmenter is None else segmenter.segment(frame.color, frame.source_index)

@@ -19,7 +19,7 @@ from semslam.config import Config
 from semslam.errors import DatasetError, GraphError, shortened
 from semslam.frontend.keyframes import KeyframeBuilder
 from semslam.geometry.poses import PoseLike
-from semslam.geometry.se3 import FloatArray, adjoint, invert
+from semslam.geometry.se3 import Transform, adjoint, invert
 from semslam.loop.detector import LoopDetector
 from semslam.loop.search import LoopSearch
 from semslam.loop.verification.verifier import LoopVerifier
@@ -54,7 +54,7 @@ class _SearchJob:
     """A keyframe's images, pose (4, 4), map, and labels where the caller has them."""
 
     frame: Frame
-    T_world_cam: FloatArray
+    T_world_cam: Transform
     map_id: int
     labels: LabelMap | None
 
@@ -203,7 +203,7 @@ class LoopCloser:
         chain = OdometryChain(known.union(self._keys), edges)
         steps = zip(*chain.relative(self._keys[:-1], self._keys[1:]), strict=True)
         graph = PoseGraph(self._config.backend)
-        T: FloatArray = np.eye(4)
+        T: Transform = np.eye(4)
         graph.add_keyframe(0, T)
         for number, (T_last_this, covariance, joined) in enumerate(steps, 1):
             T = T @ T_last_this if joined else np.eye(4)

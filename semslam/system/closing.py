@@ -13,7 +13,7 @@ from semslam.loop.verification.verifier import LoopVerifier
 from semslam.runtime.stopwatch import Stopwatch
 from semslam.runtime.usage import ProcessUsage, usage_now
 from semslam.runtime.workers import Worker, WorkerKind, make_worker
-from semslam.types import FloatArray, Frame, Keyframe, LabelMap, LoopConstraint, Verification
+from semslam.types import Frame, Keyframe, LabelMap, LoopConstraint, Transform, Verification
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,7 +50,7 @@ class KeyframeAnswer:
 
     keyframe: int
     verifications: tuple[Verification, ...]
-    T_world_odom: FloatArray
+    T_world_odom: Transform
     accepted: tuple[tuple[int, int], ...]
     withdrawn: tuple[tuple[int, int], ...]
     labels: LabelMap | None

@@ -4,16 +4,16 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from semslam.geometry.se3 import FloatArray, interpolate, invert, orthonormalise
+from semslam.geometry.se3 import FloatArray, Transform, interpolate, invert, orthonormalise
 from semslam.types import IntArray, Keyframe
 
 
 def recover_poses(
     timestamps: FloatArray,
-    T_odom_cam: FloatArray,
+    T_odom_cam: Transform,
     map_ids: IntArray,
     keyframes: Sequence[Keyframe],
-    optimized: Mapping[int, FloatArray],
+    optimized: Mapping[int, Transform],
 ) -> FloatArray:
     """Bend the odometry between keyframes so that it meets their optimised poses.
 

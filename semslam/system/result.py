@@ -3,7 +3,16 @@
 from dataclasses import dataclass
 
 from semslam.backend.pose_graph import GraphSolution
-from semslam.types import FloatArray, Keyframe, LoopCandidate, Motion, TrackingStatus, Verification
+from semslam.types import (
+    FloatArray,
+    Keyframe,
+    LoopCandidate,
+    Motion,
+    TrackingStatus,
+    Transform,
+    Transforms,
+    Verification,
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -22,8 +31,8 @@ class FrameState:
     index: int
     timestamp: float
     motion: Motion
-    T_odom_cam: FloatArray
-    T_world_cam: FloatArray
+    T_odom_cam: Transform
+    T_world_cam: Transform
     keyframe: int | None
 
     @property
@@ -59,7 +68,7 @@ class SlamResult:
     outcomes: tuple[Verification, ...]
     solution: GraphSolution
     graph_poses: FloatArray
-    poses: FloatArray
+    poses: Transforms
     components: tuple[int, ...]
     live_loops: frozenset[tuple[int, int]] = frozenset()
     notes: tuple[str, ...] = ()

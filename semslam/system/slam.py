@@ -24,7 +24,17 @@ from semslam.system.closing import KeyframeAnswer, KeyframeJob, build_closing
 from semslam.system.recovery import recover_poses
 from semslam.system.refinement import refine
 from semslam.system.result import FrameState, SlamResult
-from semslam.types import FloatArray, Frame, Keyframe, LoopConstraint, Motion, Observations, Verification
+from semslam.types import (
+    Covariance6,
+    FloatArray,
+    Frame,
+    Keyframe,
+    LoopConstraint,
+    Motion,
+    Observations,
+    Transform,
+    Verification,
+)
 
 
 @dataclass(slots=True)
@@ -32,7 +42,7 @@ class _Anchor:
     """The last keyframe of a map, and the uncertainty (6, 6) of the motion since, in the current camera's tangent."""
 
     keyframe: Keyframe
-    covariance: FloatArray
+    covariance: Covariance6
 
     def extend(self, motion: Motion) -> None:
         Ad = adjoint(invert(motion.T_prev_cur))
@@ -78,7 +88,7 @@ class Slam:
         self._keyframes: list[Keyframe] = []
         self._outcomes: list[Verification] = []
         self._pending: deque[Future[KeyframeAnswer]] = deque()
-        self._T_world_odom: dict[int, FloatArray] = {}
+        self._T_world_odom: dict[int, Transform] = {}
         self._live_loops: dict[tuple[int, int], None] = {}
         self._observations: dict[int, Observations] = {}
         self._covisibility = Covisibility(config.backend.covisibility)

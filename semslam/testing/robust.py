@@ -13,7 +13,7 @@ from semslam.backend.robust.least_squares import LeastSquares
 from semslam.backend.robust.strategy import RobustProblem, RobustSolution, RobustStrategy
 from semslam.backend.steps import finish
 from semslam.config import BackendConfig
-from semslam.geometry.se3 import FloatArray, compose
+from semslam.geometry.se3 import FloatArray, Transforms, compose
 from semslam.testing.settings import check_settings
 
 KEYFRAMES = 40
@@ -111,7 +111,7 @@ def make_problem(truth: FloatArray, loops: Sequence[Edge], scale: float = 1.0) -
     return RobustProblem(trusted, odometry, loops, initial, config.max_residual, config.max_iterations)
 
 
-def poses(values: gtsam.Values) -> FloatArray:
+def poses(values: gtsam.Values) -> Transforms:
     """Poses (N, 4, 4) in the order of their keys."""
     found = read_poses(values, range(KEYFRAMES))
     return np.stack([found[key] for key in range(KEYFRAMES)])

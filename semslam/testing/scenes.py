@@ -10,7 +10,16 @@ from semslam.config import Config
 from semslam.datasets import open_dataset
 from semslam.frontend.keyframes import KeyframeBuilder
 from semslam.geometry.camera import Intrinsics
-from semslam.geometry.se3 import FloatArray, exp_so3, invert, make_transform, transform_points
+from semslam.geometry.se3 import (
+    FloatArray,
+    Points3,
+    Transform,
+    Transforms,
+    exp_so3,
+    invert,
+    make_transform,
+    transform_points,
+)
 from semslam.types import Cloud, Features, Frame, Keyframe, KeyframeView, LabelMap, UInt8Array
 
 CAMERA = Intrinsics(320, 240, 260.0, 260.0, 159.5, 119.5)
@@ -26,7 +35,7 @@ class Clip:
     """Frames with their true poses (N, 4, 4) T_world_cam."""
 
     frames: tuple[Frame, ...]
-    poses: FloatArray
+    poses: Transforms
 
 
 @lru_cache(maxsize=1)
@@ -79,7 +88,7 @@ class LoopPair:
 
     query: Keyframe
     match: Keyframe
-    T_match_query: FloatArray
+    T_match_query: Transform
 
 
 def corner_pair(noise: float = 0.003) -> LoopPair:
@@ -92,7 +101,7 @@ def corner_pair(noise: float = 0.003) -> LoopPair:
     return LoopPair(corner_view(1, T_match_query, noise), corner_view(0, np.eye(4), noise), T_match_query)
 
 
-def corner_view(identity: int, T_world_cam: FloatArray, noise: float = 0.003) -> Keyframe:
+def corner_view(identity: int, T_world_cam: Transform, noise: float = 0.003) -> Keyframe:
     """A keyframe of the corner."""
     rng, scene = np.random.default_rng(1000 + identity), np.random.default_rng(0)
     points, normals = _corner()
@@ -142,13 +151,13 @@ def _corner(step: float = 0.05) -> tuple[FloatArray, FloatArray]:
     return points[inside], normals[inside]
 
 
-def _visible(points: FloatArray) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+def _visible(points: Points3) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
     pixels = CORNER_CAMERA.project(np.where(points[:, 2:] > 0.3, points, np.nan))
     inside = (pixels >= 0).all(1) & (pixels < (CORNER_CAMERA.width, CORNER_CAMERA.height)).all(1)
     return np.asarray((points[:, 2] > 0.3) & inside)
 
 
-def _features(pixels: FloatArray, points: FloatArray, descriptors: UInt8Array) -> Features:
+def _features(pixels: FloatArray, points: Points3, descriptors: UInt8Array) -> Features:
     """Features at camera points (N, 3) without octave or angle."""
     count = len(points)
     return Features(

@@ -5,7 +5,16 @@ tangent order, rotation first, and belong to the frame on the right of the trans
 """
 
 from semslam.geometry.camera import Intrinsics
-from semslam.types.arrays import Float32Array, FloatArray, IntArray, UInt8Array
+from semslam.types.arrays import (
+    Covariance6,
+    Float32Array,
+    FloatArray,
+    IntArray,
+    Points3,
+    Transform,
+    Transforms,
+    UInt8Array,
+)
 from semslam.types.features import Cloud, Features
 from semslam.types.images import Frame, LabelMap
 from semslam.types.keyframes import Keyframe, KeyframeView
@@ -24,6 +33,7 @@ from semslam.types.trajectory import Trajectory
 
 __all__ = [
     "Cloud",
+    "Covariance6",
     "Features",
     "Float32Array",
     "FloatArray",
@@ -45,9 +55,12 @@ __all__ = [
     "Motion",
     "NodePair",
     "Observations",
+    "Points3",
     "RejectionReason",
     "TrackingStatus",
     "Trajectory",
+    "Transform",
+    "Transforms",
     "UInt8Array",
     "Verification",
 ]

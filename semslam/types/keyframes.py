@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from semslam.geometry.camera import Intrinsics
-from semslam.types.arrays import Float32Array, FloatArray, UInt8Array
+from semslam.types.arrays import Float32Array, Transform, UInt8Array
 from semslam.types.features import Cloud, Features
 from semslam.types.images import LabelMap
 
@@ -27,7 +27,7 @@ class Keyframe:
     id: int
     frame_index: int
     timestamp: float
-    T_odom_cam: FloatArray
+    T_odom_cam: Transform
     map_id: int
     intrinsics: Intrinsics
     features: Features

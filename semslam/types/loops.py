@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 from enum import StrEnum
 
-from semslam.types.arrays import FloatArray, IntArray
+from semslam.types.arrays import Covariance6, IntArray, Transform
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,8 +73,8 @@ class LoopConstraint:
     """
 
     candidate: LoopCandidate
-    T_match_query: FloatArray
-    covariance: FloatArray
+    T_match_query: Transform
+    covariance: Covariance6
     fitness: float
     inlier_rmse: float
     overlap: float

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from enum import StrEnum
 
-from semslam.types.arrays import Float32Array, FloatArray, IntArray
+from semslam.types.arrays import Covariance6, Float32Array, IntArray, Transform
 
 
 class TrackingStatus(StrEnum):
@@ -45,8 +45,8 @@ class Motion:
         observations: landmarks seen, where the odometry keeps any.
     """
 
-    T_prev_cur: FloatArray
-    covariance: FloatArray
+    T_prev_cur: Transform
+    covariance: Covariance6
     status: TrackingStatus
     map_id: int = 0
     inliers: int = 0

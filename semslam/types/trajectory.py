@@ -8,7 +8,7 @@ import numpy as np
 from semslam.errors import TrajectoryError
 from semslam.geometry.poses import pose_matrix
 from semslam.geometry.se3 import is_rigid
-from semslam.types.arrays import FloatArray
+from semslam.types.arrays import FloatArray, Transforms
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -24,7 +24,7 @@ class Trajectory:
     """
 
     timestamps: FloatArray
-    poses: FloatArray
+    poses: Transforms
 
     def __post_init__(self) -> None:
         try:

@@ -13,13 +13,13 @@ from semslam.loop.detectors.semantic.settings import NodeConfig
 from semslam.loop.segmentation.classes import PALETTE
 from semslam.system.result import FrameState
 from semslam.types import (
-    FloatArray,
     Frame,
     Intrinsics,
     LabelMap,
     LedgerEntry,
     LoopOutcome,
     Observations,
+    Transform,
 )
 from semslam.viewers.rerun_blueprint import CAMERA, FINAL, IMAGE, LIVE, TRACKING
 from semslam.viewers.viewer import FinishedRun, KeyframeScene, LoopScene, ShownLoop
@@ -50,7 +50,7 @@ class RerunViewer:
     def __init__(self, stream: "RecordingStream") -> None:
         self._stream = stream
         self._last: FrameState | None = None
-        self._poses: list[FloatArray] = []
+        self._poses: list[Transform] = []
         self._landmarks: set[int] = set()
         self._unlabelled: dict[int, Frame] = {}
         self._intrinsics: Intrinsics | None = None
@@ -149,7 +149,7 @@ class RerunViewer:
         self._stream.log(IMAGE, pinhole, static=True)
         self._stream.log("world", rr.ViewCoordinates.RIGHT_HAND_Y_DOWN, static=True)
 
-    def _show_landmarks(self, seen: Observations, camera: Intrinsics, T_world_cam: FloatArray) -> None:
+    def _show_landmarks(self, seen: Observations, camera: Intrinsics, T_world_cam: Transform) -> None:
         """Show landmarks where they are seen first."""
         import rerun as rr
 
@@ -161,7 +161,7 @@ class RerunViewer:
         self._stream.log(f"{LIVE}/landmarks", rr.Points3D(points, colors=(255, 196, 0), radii=rr.Radius.ui_points(2)))
         self._stream.log(f"{TRACKING}/landmarks", rr.Scalars(len(seen.landmarks)))
 
-    def _show_labels(self, labels: LabelMap, frame: Frame, T_world_cam: FloatArray) -> None:
+    def _show_labels(self, labels: LabelMap, frame: Frame, T_world_cam: Transform) -> None:
         import rerun as rr
 
         if self._names != labels.names:
@@ -192,7 +192,7 @@ class RerunViewer:
             self._stream.log(f"{TRACKING}/loops_{name}", rr.Scalars(len(kept)))
 
 
-def _lines(ledger: Sequence[LedgerEntry], outcome: LoopOutcome, places: dict[int, FloatArray]) -> object:
+def _lines(ledger: Sequence[LedgerEntry], outcome: LoopOutcome, places: dict[int, Transform]) -> object:
     """Lines between the keyframes of all candidates of one outcome, with what is known of each."""
     import rerun as rr
 

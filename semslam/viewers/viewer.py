@@ -7,7 +7,7 @@ from typing import Protocol
 from semslam.errors import TrajectoryError
 from semslam.eval.trajectory import align
 from semslam.system.result import FrameState
-from semslam.types import Cloud, FloatArray, Frame, Keyframe, LabelMap, LedgerEntry, Observations, Trajectory
+from semslam.types import Cloud, Frame, Keyframe, LabelMap, LedgerEntry, Observations, Trajectory, Transform
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +63,7 @@ class FinishedRun:
 
     trajectory: Trajectory
     ground_truth: Trajectory | None
-    keyframes: Mapping[int, FloatArray]
+    keyframes: Mapping[int, Transform]
     ledger: Sequence[LedgerEntry]
     map: Cloud
 

@@ -3,7 +3,7 @@
 import cv2
 import numpy as np
 
-from semslam.types import FloatArray, UInt8Array
+from semslam.types import Transform, UInt8Array
 
 MIN_TURN = 2.0
 """Degrees below which an image is left as it is."""
@@ -11,7 +11,7 @@ MIN_LEVEL = 0.5
 """Least length in the image plane of the unit vector that points down; below it the camera looks up or down."""
 
 
-def roll_of(T_odom_cam: FloatArray) -> float:
+def roll_of(T_odom_cam: Transform) -> float:
     """Degrees by which the camera is rolled against the first one of its map; 0 where it looks steeply up or down.
 
     Only differences of roll matter to a comparison, so the first camera need not have stood upright.

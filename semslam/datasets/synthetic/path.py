@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from semslam.datasets.synthetic.routes import Route, Stop
-from semslam.geometry.se3 import FloatArray
+from semslam.geometry.se3 import FloatArray, Transforms
 
 SPEED = 0.55
 """Metres a second."""
@@ -31,7 +31,7 @@ class Walk:
     """
 
     timestamps: FloatArray
-    poses: FloatArray
+    poses: Transforms
     second: npt.NDArray[np.bool_]
 
 
@@ -86,7 +86,7 @@ def _sway(times: FloatArray, seed: int) -> FloatArray:
     return np.asarray(waves * SWAY)
 
 
-def _poses(tracks: FloatArray) -> FloatArray:
+def _poses(tracks: FloatArray) -> Transforms:
     """Camera poses of tracks (N, 6): x, y, z, yaw, pitch, roll; z ahead, y down."""
     yaw, pitch, roll = np.radians(tracks[:, 3:]).T
     ahead = np.stack([np.cos(yaw) * np.cos(pitch), np.sin(yaw) * np.cos(pitch), np.sin(pitch)], 1)

@@ -10,7 +10,7 @@ from semslam.datasets.synthetic.casting import Hits, RayCaster
 from semslam.datasets.synthetic.lighting import LAMPS, bake
 from semslam.datasets.synthetic.scene import Mesh, Scene, build_mesh
 from semslam.geometry.camera import Intrinsics
-from semslam.geometry.se3 import Float32Array, FloatArray
+from semslam.geometry.se3 import Float32Array, Transform
 
 GAMMA = 2.2
 SHOULDER = 190.0
@@ -72,7 +72,7 @@ class Renderer:
         self._density = _density(self._mesh, self._uvs, self._atlas.size)
         self._tables: dict[Lighting, Float32Array] = {}
 
-    def render(self, T_world_cam: FloatArray, camera: Intrinsics, lighting: Lighting) -> View:
+    def render(self, T_world_cam: Transform, camera: Intrinsics, lighting: Lighting) -> View:
         """One view from a pose, without any of the sensor's faults."""
         shape = camera.height, camera.width
         directions = _directions(camera).reshape(-1, 3)
@@ -88,7 +88,7 @@ class Renderer:
             color.reshape(*shape, 3), hits.distance.reshape(shape), labels.reshape(shape), cosine.reshape(shape)
         )
 
-    def _cast(self, T_world_cam: FloatArray, directions: Float32Array) -> tuple[Hits, Float32Array]:
+    def _cast(self, T_world_cam: Transform, directions: Float32Array) -> tuple[Hits, Float32Array]:
         """Hits of directions (N, 3) with z = 1, whose distance is then the depth; and cosines of incidence (N,)."""
         rays = np.empty((len(directions), 6), dtype=np.float32)
         rays[:, :3] = T_world_cam[:3, 3]
