@@ -1,6 +1,7 @@
 """Rendered scenes as a dataset: ``synthetic:house?seed=1&light=dim``."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import ClassVar, Self
@@ -11,12 +12,13 @@ import numpy.typing as npt
 from pydantic import Field, ValidationError, field_validator
 
 from semslam.config import DatasetConfig, Section
-from semslam.datasets.synthetic.path import Walk, walk
+from semslam.datasets.synthetic.path import Walk, Way
 from semslam.datasets.synthetic.renderer import Lighting, Renderer, View
 from semslam.datasets.synthetic.scenes import PLANS
-from semslam.datasets.synthetic.sensor import sense_color, sense_depth
+from semslam.datasets.synthetic.sensor import DEPTH_SENSORS, sense_color
 from semslam.datasets.synthetic.shapes import Part
 from semslam.errors import DatasetError
+from semslam.geometry.se3 import Transform, Transforms
 from semslam.types import Frame, Intrinsics, Trajectory
 
 LIGHTS = {
@@ -41,6 +43,13 @@ class Request(Section):
     offset: float = Field(0.0, ge=-1, le=1, description="metres that the second pass keeps to the right of the first")
     moved: bool = Field(False, description="objects moved or missing on the second pass")
     noise: bool = Field(True, description="whether the sensor has noise and holes")
+    sensor: str = Field("structured", description="what measures depth: " + ", ".join(DEPTH_SENSORS))
+    sway: float = Field(1.0, ge=0, le=20, description="factor on the hand's sway")
+    readout: float = Field(0.0, ge=0, le=0.1, description="seconds from colour's first row to its last")
+    depth_readout: float = Field(0.0, ge=0, le=0.1, description="seconds from depth's first row to its last")
+    delay: float = Field(0.0, ge=-0.1, le=0.1, description="seconds by which depth is taken after colour")
+    depth_factor: float = Field(1.0, ge=0.5, le=2, description="measured depth divided by the true one")
+    stated: bool = Field(True, description="whether the camera states its read-out")
 
     @field_validator("light")
     @classmethod
@@ -48,6 +57,13 @@ class Request(Section):
         if light not in LIGHTS:
             raise ValueError(f"'{light}' is none of {', '.join(LIGHTS)}")
         return light
+
+    @field_validator("sensor")
+    @classmethod
+    def _is_a_sensor(cls, sensor: str) -> str:
+        if sensor not in DEPTH_SENSORS:
+            raise ValueError(f"'{sensor}' is none of {', '.join(DEPTH_SENSORS)}")
+        return sensor
 
     @classmethod
     def parse(cls, query: str) -> Self:
@@ -107,7 +123,8 @@ class SyntheticDataset:
         """A Kinect-like pinhole without distortion."""
         width, height = self._request.width, self._request.width * 3 // 4
         focal = FIELD_OF_VIEW * width
-        return Intrinsics(width, height, focal, focal, (width - 1) / 2, (height - 1) / 2, readout=0.0)
+        readout = self._request.readout if self._request.stated else None
+        return Intrinsics(width, height, focal, focal, (width - 1) / 2, (height - 1) / 2, readout=readout)
 
     @cached_property
     def timestamps(self) -> list[float]:
@@ -121,7 +138,7 @@ class SyntheticDataset:
 
     @cached_property
     def ground_truth(self) -> Trajectory:
-        """Exact poses; the world's z points up."""
+        """Exact poses at the instant of colour's middle row; the world's z points up."""
         return Trajectory(self._walk.timestamps, self._walk.poses)
 
     @property
@@ -144,9 +161,12 @@ class SyntheticDataset:
         view = self.view(index)
         if self._request.noise:
             rng = np.random.default_rng([self._request.seed, 2, index])
+            sense_depth = DEPTH_SENSORS[self._request.sensor]
             color, depth = sense_color(view.color, rng), sense_depth(view, self.intrinsics.fx, rng)
         else:
             color, depth = np.clip(np.rint(view.color), 0, 255).astype(np.uint8), view.depth
+        if self._request.depth_factor != 1:
+            depth = depth * np.float32(self._request.depth_factor)
         return Frame(index, self.timestamps[index], color, depth, self.intrinsics)
 
     def labels(self, index: int) -> npt.NDArray[np.uint8]:
@@ -154,7 +174,7 @@ class SyntheticDataset:
         return self.view(index).labels
 
     def view(self, index: int) -> View:
-        """What a perfect camera sees in a frame.
+        """What a camera without noise sees in a frame: colour and labels in colour's instants, depth in its own.
 
         Raises:
             IndexError: there is no such frame.
@@ -164,17 +184,33 @@ class SyntheticDataset:
         second = bool(self._walk.second[index])
         renderer = _renderer(self._scene, self._request.seed, bool(second and self._request.moved))
         lighting = LIGHTS[self._request.light] if second else LIGHTS["same"]
-        return renderer.render(self._walk.poses[index], self.intrinsics, lighting)
+        request, camera = self._request, self.intrinsics
+        seen = renderer.render(self._poses(index, request.readout, 0.0), camera, lighting)
+        if not request.delay and request.depth_readout == request.readout:
+            return seen
+        depth, cosine = renderer.measure(self._poses(index, request.depth_readout, request.delay), camera)
+        return replace(seen, depth=depth, cosine=cosine)
+
+    def _poses(self, index: int, readout: float, delay: float) -> Transform | Transforms:
+        """Pose of a frame (4, 4), or of each of its rows (H, 4, 4) where they are not of one instant."""
+        if not readout and not delay:
+            return np.asarray(self._walk.poses[index])
+        camera = self.intrinsics
+        rows = (np.arange(camera.height) - camera.cy) / camera.height
+        return self._way.poses(self._walk.timestamps[index] + delay + readout * rows)
 
     def surfaces(self, moved: bool) -> Sequence[Part]:
         """What stands in the scene, before or after things were moved."""
         return PLANS[self._scene].build(self._request.seed, moved).parts
 
     @cached_property
+    def _way(self) -> Way:
+        return Way(PLANS[self._scene].route, self._request.seed, self._request.offset, self._request.sway)
+
+    @cached_property
     def _walk(self) -> Walk:
-        request = self._request
-        whole = walk(PLANS[self._scene].route, request.rate, request.seed, request.offset)
-        kept = slice(0, request.frames or None)
+        whole = self._way.walk(self._request.rate)
+        kept = slice(0, self._request.frames or None)
         return Walk(whole.timestamps[kept], whole.poses[kept], whole.second[kept])
 
 

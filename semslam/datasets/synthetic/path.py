@@ -35,26 +35,37 @@ class Walk:
     second: npt.NDArray[np.bool_]
 
 
-def walk(route: Route, rate: float, seed: int, offset: float = 0.0) -> Walk:
-    """Walk along a route.
+class Way:
+    """The camera's pose at any time.
 
     Args:
         route: gives the stops.
-        rate: frames a second.
         seed: of the sway.
         offset: metres by which the second pass keeps to the right of the first.
+        sway: factor on the size of the sway.
     """
-    stops = route.both_passes()
-    knots = _times(stops)
-    returned = knots[len(route.stops) - 1]
-    times = np.arange(0.0, knots[-1], 1.0 / rate)
-    tracks = _smooth(knots, np.array([[s.x, s.y, HEIGHT, s.yaw, s.pitch, 0.0] for s in stops]), times)
-    tracks += _sway(times, seed)
-    ahead = np.radians(tracks[:, 3])
-    shift = offset * np.clip((times - returned) / 2.0, 0.0, 1.0)
-    tracks[:, 0] += shift * np.sin(ahead)
-    tracks[:, 1] -= shift * np.cos(ahead)
-    return Walk(times, _poses(tracks), times >= returned)
+
+    def __init__(self, route: Route, seed: int, offset: float = 0.0, sway: float = 1.0) -> None:
+        stops = route.both_passes()
+        self._knots = _times(stops)
+        self._tracks = np.array([[s.x, s.y, HEIGHT, s.yaw, s.pitch, 0.0] for s in stops])
+        self._seed, self._offset, self._sway = seed, offset, sway
+        self._returned = float(self._knots[len(route.stops) - 1])
+
+    def walk(self, rate: float) -> Walk:
+        """The whole way at a steady number of frames a second."""
+        times = np.arange(0.0, self._knots[-1], 1.0 / rate)
+        return Walk(times, self.poses(times), times >= self._returned)
+
+    def poses(self, times: FloatArray) -> FloatArray:
+        """Poses T_world_cam (N, 4, 4) at times (N,) in seconds."""
+        tracks = _smooth(self._knots, self._tracks, times)
+        tracks += _waves(times, self._seed) * self._sway
+        ahead = np.radians(tracks[:, 3])
+        shift = self._offset * np.clip((times - self._returned) / 2.0, 0.0, 1.0)
+        tracks[:, 0] += shift * np.sin(ahead)
+        tracks[:, 1] -= shift * np.cos(ahead)
+        return _poses(tracks)
 
 
 def _times(stops: Sequence[Stop]) -> FloatArray:
@@ -78,7 +89,7 @@ def _smooth(knots: FloatArray, values: FloatArray, times: FloatArray) -> FloatAr
     )  # fmt: skip
 
 
-def _sway(times: FloatArray, seed: int) -> FloatArray:
+def _waves(times: FloatArray, seed: int) -> FloatArray:
     """A few slow waves in each of the six tracks, (N, 6)."""
     rng = np.random.default_rng([seed, 1])
     frequencies, phases = rng.uniform(0.2, 1.3, (6, 4)), rng.uniform(0, 2 * np.pi, (6, 4))

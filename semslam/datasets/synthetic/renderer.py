@@ -10,7 +10,7 @@ from semslam.datasets.synthetic.casting import Hits, RayCaster
 from semslam.datasets.synthetic.lighting import LAMPS, bake
 from semslam.datasets.synthetic.scene import Mesh, Scene, build_mesh
 from semslam.geometry.camera import Intrinsics
-from semslam.geometry.se3 import Float32Array, Transform
+from semslam.geometry.se3 import Float32Array, Transform, Transforms
 
 GAMMA = 2.2
 SHOULDER = 190.0
@@ -72,27 +72,41 @@ class Renderer:
         self._density = _density(self._mesh, self._uvs, self._atlas.size)
         self._tables: dict[Lighting, Float32Array] = {}
 
-    def render(self, T_world_cam: Transform, camera: Intrinsics, lighting: Lighting) -> View:
-        """One view from a pose, without any of the sensor's faults."""
+    def render(self, poses: Transform | Transforms, camera: Intrinsics, lighting: Lighting) -> View:
+        """One view without any of the sensor's faults.
+
+        Args:
+            poses: T_world_cam, (4, 4), or (H, 4, 4) where each row is exposed from a pose of its own.
+            camera: the camera.
+            lighting: how the light is mixed.
+        """
         shape = camera.height, camera.width
         directions = _directions(camera).reshape(-1, 3)
-        hits, cosine = self._cast(T_world_cam, directions)
+        hits, cosine = self._cast(poses, directions, np.arange(len(directions)) // camera.width)
         color = self._shade(hits, cosine, directions, camera, lighting)
         edges = np.flatnonzero(self._edges(hits, cosine, shape))
         fine = directions[edges].repeat(len(SUBPIXELS), axis=0)
         fine[:, :2] += np.tile(SUBPIXELS / (camera.fx, camera.fy), (len(edges), 1)).astype(np.float32)
-        again = self._shade(*self._cast(T_world_cam, fine), fine, camera, lighting)
+        rows = (edges // camera.width).repeat(len(SUBPIXELS))
+        again = self._shade(*self._cast(poses, fine, rows), fine, camera, lighting)
         color[edges] = (color[edges] + again.reshape(len(edges), len(SUBPIXELS), 3).sum(1)) / (1 + len(SUBPIXELS))
         labels = np.where(hits.seen, self._mesh.labels[hits.triangles], 0).astype(np.uint8)
         return View(
             color.reshape(*shape, 3), hits.distance.reshape(shape), labels.reshape(shape), cosine.reshape(shape)
         )
 
-    def _cast(self, T_world_cam: Transform, directions: Float32Array) -> tuple[Hits, Float32Array]:
+    def measure(self, poses: Transform | Transforms, camera: Intrinsics) -> tuple[Float32Array, Float32Array]:
+        """Exact depth and cosine of incidence (H, W) alone, as in ``View``, from poses as for ``render``."""
+        shape = camera.height, camera.width
+        directions = _directions(camera).reshape(-1, 3)
+        hits, cosine = self._cast(poses, directions, np.arange(len(directions)) // camera.width)
+        return hits.distance.reshape(shape), cosine.reshape(shape)
+
+    def _cast(
+        self, poses: Transform | Transforms, directions: Float32Array, rows: npt.NDArray[np.int64]
+    ) -> tuple[Hits, Float32Array]:
         """Hits of directions (N, 3) with z = 1, whose distance is then the depth; and cosines of incidence (N,)."""
-        rays = np.empty((len(directions), 6), dtype=np.float32)
-        rays[:, :3] = T_world_cam[:3, 3]
-        rays[:, 3:] = directions @ T_world_cam[:3, :3].T.astype(np.float32)
+        rays = _rays(poses, directions, rows)
         hits = self._caster.cast(rays)
         along = hits.normals[:, 0] * rays[:, 3] + hits.normals[:, 1] * rays[:, 4] + hits.normals[:, 2] * rays[:, 5]
         return hits, np.abs(along) / _length(directions)
@@ -136,6 +150,18 @@ class Renderer:
             edge[a] |= step
             edge[b] |= step
         return edge
+
+
+def _rays(poses: Transform | Transforms, directions: Float32Array, rows: npt.NDArray[np.int64]) -> Float32Array:
+    """Rays (N, 6) of directions (N, 3) in image rows (N,), from one pose or one for each row."""
+    rays = np.empty((len(directions), 6), dtype=np.float32)
+    if poses.ndim == 2:
+        rays[:, :3] = poses[:3, 3]
+        rays[:, 3:] = directions @ poses[:3, :3].T.astype(np.float32)
+    else:
+        rays[:, :3] = poses[rows, :3, 3]
+        rays[:, 3:] = np.einsum("nij,nj->ni", poses[:, :3, :3].astype(np.float32)[rows], directions)
+    return rays
 
 
 def _length(directions: Float32Array) -> Float32Array:
