@@ -26,6 +26,7 @@ REASONS = {
     "inconsistent": "contradicts odometry",
     "ambiguous": "ambiguous",
     "outlier": "outlier in the graph",
+    "shed": "not verified for want of time",
 }
 
 

@@ -13,7 +13,7 @@ from semslam.errors import printable
 
 if TYPE_CHECKING:
     from semslam.eval.report.tables import Table as TextTable
-    from semslam.runs.metrics import LoopMetrics, Metrics
+    from semslam.runs.metrics import Latency, LoopMetrics, Metrics
     from semslam.system.result import FrameState
 
 
@@ -98,10 +98,28 @@ def metrics_table(runs: Sequence["Metrics"], title: str) -> Table:
         ),
         ("accepted true / inaccurate / false", [_counts(run.loops, "true", "inaccurate", "false") for run in runs]),
         ("frames per second", [f"{run.time.fps:.2f}" for run in runs]),
+        *_realtime_rows(runs),
     ]
     for heading, cells in rows:
         table.add_row(heading, *cells)
     return table
+
+
+def _realtime_rows(runs: Sequence["Metrics"]) -> list[tuple[str, list[str]]]:
+    """What runs in real time did without; nothing where there is none."""
+    if all(run.realtime is None for run in runs):
+        return []
+    values = [run.realtime for run in runs]
+    return [
+        ("frames dropped", ["-" if value is None else str(value.dropped) for value in values]),
+        ("candidates not verified for want of time", ["-" if value is None else str(value.shed) for value in values]),
+        ("tracking of a frame, ms, median / p99", [_quantiles(run.time.tracking_ms, 1) for run in runs]),
+        ("keyframe to its loop's effect, s, median / p99", [_quantiles(run.time.loop_s, 2) for run in runs]),
+    ]
+
+
+def _quantiles(latency: "Latency | None", digits: int) -> str:
+    return "-" if latency is None else f"{latency.median:.{digits}f} / {latency.p99:.{digits}f}"
 
 
 def comparison_table(runs: Sequence["Metrics"], title: str) -> Table:

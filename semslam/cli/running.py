@@ -15,6 +15,7 @@ from semslam.errors import ResultsError, SemslamError
 if TYPE_CHECKING:
     from semslam.config import Config
     from semslam.datasets.dataset import Dataset
+    from semslam.datasets.feed import Feed
     from semslam.runs.journal import JournalContent
     from semslam.runs.metrics import Metrics
     from semslam.runs.pipeline import RunResult
@@ -30,7 +31,7 @@ NOT_TRACKED = 3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Task:
-    """What is to be run; with a recording, from its motions."""
+    """What is to be run: with a recording from its motions, with a feed in real time."""
 
     dataset: "Dataset"
     config: "Config"
@@ -40,6 +41,7 @@ class Task:
     saved_run: Path | None = None
     recording: "Recording | None" = None
     viewer: "Viewer | None" = None
+    feed: "Feed | None" = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -87,7 +89,8 @@ def _computed(task: Task, place: "RunPlace", stop: "Stop", past: "JournalContent
 
     source = str(Path(task.source).resolve()) if Path(task.source).exists() else task.source
     saved_run = None if task.saved_run is None else str(task.saved_run.resolve())
-    header = JournalHeader(task.config.dump(), source, task.plots, saved_run, tuple(task.command))
+    command, realtime = tuple(task.command), task.feed is not None
+    header = JournalHeader(task.config.dump(), source, task.plots, saved_run, command, realtime)
     verifier = None if past is None else RecallingVerifier(build_verifier(task.config), past.outcomes)
     with writing(place.directory):
         journal = Journal(place.work / JOURNAL, header, past)
@@ -99,7 +102,7 @@ def _computed(task: Task, place: "RunPlace", stop: "Stop", past: "JournalContent
             update(index + 1, frames)
 
         if task.recording is None:
-            return run(task.dataset, task.config, progress, task.viewer, stop, journal, verifier)
+            return run(task.dataset, task.config, progress, task.viewer, stop, journal, verifier, task.feed)
         return replay(task.dataset, task.recording, task.config, progress, verifier, task.viewer, stop, journal)
 
 

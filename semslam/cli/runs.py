@@ -10,7 +10,7 @@ from semslam.cli import options
 from semslam.cli.command import Command, example
 from semslam.cli.console import remark
 from semslam.cli.running import Task, carry_out, end, show
-from semslam.errors import ConfigError
+from semslam.errors import ConfigError, ResultsError
 
 if TYPE_CHECKING:
     from semslam.runs.recording import SavedFrontEnd
@@ -18,6 +18,14 @@ if TYPE_CHECKING:
 
 OutDirectory = Annotated[Path | None, typer.Option("--out", help="The run folder itself (default: runs/...).")]
 Visualize = Annotated[bool, typer.Option("--visualize", help="Start the viewer and show the run as it goes.")]
+RealTime = Annotated[
+    bool,
+    typer.Option("--realtime", help="Feed frames at their stamps and drop those that come too late."),
+]
+Rate = Annotated[
+    float | None,
+    typer.Option("--rate", min=0.1, max=1000, help="With --realtime: frames per second, whatever their stamps."),
+]
 RerunFile = Annotated[Path | None, typer.Option("--rerun", help="Write a recording (.rrd) for the viewer.")]
 
 
@@ -39,12 +47,15 @@ def run_command(
     plots: options.Plots = True,
     visualize: Visualize = False,
     rerun_file: RerunFile = None,
+    realtime: RealTime = False,
+    rate: Rate = None,
     resume: Annotated[
         Path | None, typer.Option("--resume", help="A run folder whose run was killed: goes on with it.")
     ] = None,
 ) -> None:
     """Run SLAM over a sequence and write a run folder."""
     from semslam.datasets import open_dataset
+    from semslam.datasets.realtime import RealTimeFeed
     from semslam.runs.place import link_latest, reserved, reserved_anew
     from semslam.runs.recording import read_front_end
     from semslam.runtime.stopping import stop_on_signals
@@ -63,11 +74,17 @@ def run_command(
                 max_frames,
                 loader,
                 stride > 1,
+                realtime,
+                rate,
             )
         ):
             raise ConfigError("--resume takes all settings from the run's journal; only the sequence may be named.")
         _resume(resume, sequence)
         return
+    if rate is not None and not realtime:
+        raise ConfigError("--rate is for --realtime.")
+    if realtime and saved_run is not None:
+        raise ConfigError("--realtime needs frames to track; --from takes the motions of a saved run.")
     saved = None if saved_run is None else read_front_end(saved_run)
     recording = None if saved is None else saved.recording
     if saved_run is not None and config is not None:
@@ -86,7 +103,8 @@ def run_command(
     with stop_on_signals() as stop:
         with reservation as place:
             viewer = _viewer(place.directory.name, rerun_file, visualize)
-            task = Task(dataset, chosen, source, plots, sys.argv, saved_run, recording, viewer)
+            feed = RealTimeFeed(dataset, rate) if realtime else None
+            task = Task(dataset, chosen, source, plots, sys.argv, saved_run, recording, viewer, feed)
             done = carry_out(task, place, stop)
         if viewer is not None:
             viewer.close()
@@ -109,6 +127,8 @@ def _resume(directory: Path, sequence: str | None) -> None:
         with reopened(directory) as place:
             past = read_journal(place.work / JOURNAL)
             header = past.header
+            if header.realtime:
+                raise ResultsError(f"The run in {directory} was made in real time, which does not come again.")
             settings = place.work / "config.yaml"
             settings.write_text(header.config, encoding="utf-8")
             config = load_saved_config(settings)
@@ -155,6 +175,7 @@ COMMANDS = (
             "semslam run DIR --detector none --odometry dense",
             "semslam run DIR --set keyframes.interval=0.5",
             "semslam run --from runs/latest --detector fused",
+            "semslam run recording.bag --realtime",
         ),
     ),
 )

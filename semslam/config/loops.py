@@ -14,6 +14,9 @@ class LoopConfig(Section):
         3, "maximum number of candidates predicted from the last verified loop and odometry; 0 = none", ge=0
     )
     delay: int = setting(1, "number of keyframes after which a loop moves the live poses", ge=0)
+    max_behind: int = setting(
+        3, "number of keyframes that may wait in a run in real time before candidates are left unverified", ge=0
+    )
     worker: Literal["auto", "process", "thread", "none"] = setting(
         "auto", "where loops are closed, beside tracking or not; auto = a process where a sequence is long"
     )

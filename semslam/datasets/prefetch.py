@@ -29,7 +29,7 @@ def prefetch(dataset: Dataset, ahead: int = 4) -> Iterator[Frame | DatasetError]
     pending: deque[Future[Frame | DatasetError]] = deque()
     try:
         for index in range(len(dataset)):
-            pending.append(reader.submit(_read, dataset, index))
+            pending.append(reader.submit(read, dataset, index))
             if len(pending) > ahead:
                 yield pending.popleft().result()
         while pending:
@@ -38,7 +38,8 @@ def prefetch(dataset: Dataset, ahead: int = 4) -> Iterator[Frame | DatasetError]
         reader.shutdown(wait=True, cancel_futures=True)
 
 
-def _read(dataset: Dataset, index: int) -> Frame | DatasetError:
+def read(dataset: Dataset, index: int) -> Frame | DatasetError:
+    """A frame, or the error that stands in its place."""
     try:
         return dataset.frame(index)
     except DatasetError as error:

@@ -2,6 +2,7 @@
 
 import time
 
+from semslam.runs.latency import Latencies
 from semslam.runs.metrics import TimeMetrics
 from semslam.runtime.stopwatch import Stopwatch
 from semslam.runtime.usage import ProcessUsage, usage_now
@@ -19,7 +20,7 @@ class RunClock:
         if usage.process != self._start.process:
             self._beside = usage
 
-    def read(self, frames: int, stopwatch: Stopwatch) -> TimeMetrics:
+    def read(self, frames: int, stopwatch: Stopwatch, latencies: Latencies) -> TimeMetrics:
         """The times of a run of so many frames."""
         wall, now, beside = time.perf_counter() - self._wall, usage_now(), self._beside
         return TimeMetrics(
@@ -28,4 +29,6 @@ class RunClock:
             cpu_s=round(now.cpu_s - self._start.cpu_s + (0.0 if beside is None else beside.cpu_s), 3),
             peak_mb=round(now.peak_mb + (0.0 if beside is None else beside.peak_mb), 1),
             stages_ms=stopwatch.medians_ms(),
+            tracking_ms=latencies.tracking_ms,
+            loop_s=latencies.loop_s,
         )

@@ -52,6 +52,7 @@ class JournalHeader:
         plots: whether pictures are drawn.
         saved_run: the run whose motions are repeated, or None.
         command: the command line.
+        realtime: whether its frames came at their own time.
         version: of semslam.
     """
 
@@ -60,6 +61,7 @@ class JournalHeader:
     plots: bool
     saved_run: str | None
     command: tuple[str, ...]
+    realtime: bool = False
     version: str = __version__
 
 

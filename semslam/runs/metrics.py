@@ -20,14 +20,53 @@ class LoopMetrics(_Record):
     false: int | None = None
 
 
+class Latency(_Record):
+    """How long something takes: median, 95 and 99 % quantiles, and the longest."""
+
+    median: float
+    p95: float
+    p99: float
+    worst: float
+
+
 class TimeMetrics(_Record):
-    """Where the time went; medians of the calls by stage."""
+    """Where the time went.
+
+    Attributes:
+        wall_s: seconds from the first frame to the result.
+        fps: frames per second of that.
+        cpu_s: processor time.
+        peak_mb: largest resident size.
+        stages_ms: median of the calls by stage.
+        tracking_ms: of a frame, loops not included where they are closed beside tracking.
+        loop_s: from a keyframe to the frame at which its loops move the live poses.
+    """
 
     wall_s: float
     fps: float
     cpu_s: float
     peak_mb: float
     stages_ms: dict[str, float]
+    tracking_ms: Latency | None = None
+    loop_s: Latency | None = None
+
+
+class RealTimeMetrics(_Record):
+    """Of a run whose frames came at their own time: it depends on the speed of the machine.
+
+    Attributes:
+        rate_hz: frames per second; None = at their stamps.
+        dropped: frames that came too late and were left out.
+        shed: candidates that were not verified, since loop closing was behind.
+        shed_keyframes: keyframes that they were of.
+        lag_ms: from the moment at which a frame came to its pose.
+    """
+
+    rate_hz: float | None
+    dropped: int
+    shed: int
+    shed_keyframes: int
+    lag_ms: Latency
 
 
 class Metrics(_Record):
@@ -53,6 +92,7 @@ class Metrics(_Record):
         time: seconds and memory.
         interrupted: whether the run was stopped before the last frame.
         error: what stopped it, where that was an error.
+        realtime: of a run in real time; None of all others, which give the same result each time.
     """
 
     sequence: str
@@ -74,3 +114,4 @@ class Metrics(_Record):
     time: TimeMetrics
     interrupted: bool = False
     error: str | None = None
+    realtime: RealTimeMetrics | None = None

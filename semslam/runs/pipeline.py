@@ -4,6 +4,7 @@ from contextlib import closing
 
 from semslam.config import Config
 from semslam.datasets.dataset import Dataset
+from semslam.datasets.feed import Feed
 from semslam.loop.verification.verifier import LoopVerifier
 from semslam.runs.journal import Journal
 from semslam.runs.recording import Recording
@@ -28,6 +29,7 @@ def run(
     stop: Stop | None = None,
     journal: Journal | None = None,
     verifier: LoopVerifier | None = None,
+    feed: Feed | None = None,
 ) -> RunResult:
     """Run SLAM over a dataset.
 
@@ -42,6 +44,8 @@ def run(
         stop: says between frames whether the sequence is to end early, as Ctrl-C does.
         journal: takes what is found as it is found.
         verifier: decides on candidates; None = the registered one.
+        feed: hands out the dataset's frames at their own time; None = each is read when the one before is done. With a
+            feed nothing waits for loop closing, and the result depends on the machine's speed.
 
     Raises:
         ConfigError: a name or setting is unknown.
@@ -49,7 +53,7 @@ def run(
         DatasetError: no frame at all could be read or tracked.
         PartialRunError: anything went wrong after the first tracked frame; it holds what there is.
     """
-    with closing(Session(dataset, config or Config(), verifier, viewer, journal)) as session:
+    with closing(Session(dataset, config or Config(), verifier, viewer, journal, feed)) as session:
         session.drive(session.track(), progress, stop or Stop())
         return session.result()
 

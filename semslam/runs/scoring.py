@@ -14,7 +14,7 @@ from semslam.eval.metrics import TrajectoryMetrics
 from semslam.eval.trajectory import coverage, score_trajectory
 from semslam.runs.contributions import loop_contributions
 from semslam.runs.ledger import rejected_entry, verified_entry
-from semslam.runs.metrics import LoopMetrics, Metrics, TimeMetrics
+from semslam.runs.metrics import LoopMetrics, Metrics, RealTimeMetrics, TimeMetrics
 from semslam.system.result import FrameState, SlamResult
 from semslam.types import (
     JudgedLoop,
@@ -54,6 +54,7 @@ def score_run(
     time: TimeMetrics,
     interrupted: bool = False,
     error: str | None = None,
+    realtime: RealTimeMetrics | None = None,
 ) -> Scores:
     """Score a run; without ground truth, or where it meets fewer than three poses, the errors are None."""
     truth = dataset.ground_truth
@@ -80,6 +81,7 @@ def score_run(
         time=time,
         interrupted=interrupted,
         error=error,
+        realtime=realtime,
     )
     return Scores(odometry, live, trajectory, ledger, metrics)
 

@@ -6,6 +6,7 @@ from functools import lru_cache, partial
 
 from semslam.config import Config
 from semslam.datasets.dataset import Dataset
+from semslam.datasets.feed import Feed
 from semslam.datasets.plausibility import check_plausibility
 from semslam.datasets.prefetch import prefetch
 from semslam.errors import DatasetError, as_our_own
@@ -14,7 +15,9 @@ from semslam.loop.verification.verifier import LoopVerifier
 from semslam.maps.cloud import join_clouds
 from semslam.runs.clock import RunClock
 from semslam.runs.journal import Journal, JournalError
+from semslam.runs.latency import Latencies
 from semslam.runs.metrics import Metrics
+from semslam.runs.realtime import measure_realtime, realtime_notes
 from semslam.runs.recording import RecordedFrame, Recording, checksum
 from semslam.runs.result import PartialRunError, RunResult
 from semslam.runs.scoring import Scores, score_run
@@ -43,12 +46,14 @@ class Session:
         verifier: LoopVerifier | None = None,
         viewer: Viewer | None = None,
         journal: Journal | None = None,
+        feed: Feed | None = None,
     ) -> None:
-        self._dataset, self._config, self._journal = dataset, config, journal
+        self._dataset, self._config, self._journal, self._feed = dataset, config, journal, feed
         self._viewer = viewer or NoViewer()
-        self._stopwatch, self._clock = Stopwatch(), RunClock()
-        worker = _worker(config, len(dataset))
-        self._slam = Slam.from_config(config, self._stopwatch, verifier, worker, self._show_answer)
+        self._stopwatch, self._clock, self._latencies = Stopwatch(), RunClock(), Latencies()
+        worker = _worker(config, len(dataset), feed is not None)
+        realtime = feed is not None
+        self._slam = Slam.from_config(config, self._stopwatch, verifier, worker, self._show_answer, realtime)
         self._unreadable: list[str] = []
         self._checksum = 0
         self._interrupted = False
@@ -59,15 +64,26 @@ class Session:
     def track(self) -> Iterator[tuple[int, FrameState | None]]:
         """Read and track every frame."""
         self._looks = True
-        for index, item in enumerate(prefetch(self._dataset)):
+        if self._feed is not None:
+            self._slam.wait_until_ready()
+        for index, item, came in self._frames():
             if isinstance(item, DatasetError):
                 self._unreadable.append(str(item))
                 yield index, None
             else:
                 self._checksum = self._checksum or checksum(item)
+                self._latencies.begin(came)
                 state = self._slam.process(item)
+                self._latencies.done(state.keyframe)
                 self._show(state, item)
                 yield index, state
+
+    def _frames(self) -> Iterator[tuple[int, Frame | DatasetError, float | None]]:
+        """Each frame with its place and, where it comes by itself, the moment at which it came."""
+        if self._feed is None:
+            yield from ((index, item, None) for index, item in enumerate(prefetch(self._dataset)))
+        else:
+            yield from ((arrival.index, arrival.item, arrival.at) for arrival in self._feed)
 
     def repeat(self, recording: Recording) -> Iterator[tuple[int, FrameState]]:
         """Take each frame's motion from a recording."""
@@ -75,7 +91,9 @@ class Session:
         self._checksum, self._interrupted = recording.checksum, recording.interrupted
         for frame in recording.frames:
             read = lru_cache(maxsize=1)(partial(self._dataset.frame, frame.index))
+            self._latencies.begin()
             state = self._slam.advance(frame.index, frame.timestamp, frame.motion, read)
+            self._latencies.done(state.keyframe)
             self._show(state, None if state.keyframe is None else read())
             yield frame.index, state
 
@@ -89,6 +107,8 @@ class Session:
     def _show_answer(self, answer: KeyframeAnswer) -> None:
         """Show the viewer what became of a keyframe, and note it."""
         self._clock.note(answer.usage)
+        if answer.accepted:
+            self._latencies.loop(answer.keyframe)
         if self._journal is not None:
             self._journal.outcomes(answer.verifications)
         loops = tuple(
@@ -152,9 +172,11 @@ class Session:
             raise as_our_own(error) from error
 
     def _joined(self, slam: SlamResult, error: str | None) -> RunResult:
-        times = self._clock.read(len(slam.frames), self._stopwatch)
+        times = self._clock.read(len(slam.frames), self._stopwatch, self._latencies)
         unreadable = len(self._unreadable)
-        scores = score_run(self._dataset, self._config, slam, unreadable, times, self._interrupted, error)
+        lag = self._latencies.lag_ms
+        realtime = None if self._feed is None or lag is None else measure_realtime(self._feed, slam, lag)
+        scores = score_run(self._dataset, self._config, slam, unreadable, times, self._interrupted, error, realtime)
         self._viewer.finish(partial(_shown_at_the_end, slam, scores, self._dataset.ground_truth))
         return RunResult(
             config=self._config,
@@ -173,6 +195,7 @@ class Session:
             ),
             notes=(
                 *self._doubts(slam, scores.metrics),
+                *([] if self._feed is None else realtime_notes(self._feed, slam)),
                 *self._dataset.notes,
                 *self._unreadable,
                 *slam.notes,
@@ -188,13 +211,15 @@ class Session:
         return [*(doubt.sentence for doubt in found), *([] if remark is None else [remark])]
 
 
-def _worker(config: Config, frames: int) -> WorkerKind:
+def _worker(config: Config, frames: int, realtime: bool) -> WorkerKind:
     """Where loops are closed; a process takes seconds to start, which a short sequence does not win back.
+
+    In real time it has started before the first frame.
 
     Where runs are made side by side, in processes of their own, each stays in its process.
     """
     if config.loops.worker == "auto":
-        is_worth_it = frames >= LONG_SEQUENCE and multiprocessing.parent_process() is None
+        is_worth_it = (realtime or frames >= LONG_SEQUENCE) and multiprocessing.parent_process() is None
         return WorkerKind.PROCESS if is_worth_it else WorkerKind.NONE
     return WorkerKind(config.loops.worker)
 

@@ -42,6 +42,9 @@ class Worker(ABC, Generic[Job, Answer]):
     def close(self) -> None:
         """Finish the jobs that are left, and end."""
 
+    def wait_until_ready(self) -> None:
+        """Wait until jobs are begun as soon as they are submitted."""
+
 
 class InlineWorker(Worker[Job, Answer]):
     """Does each job at once, in the caller's thread."""
@@ -89,7 +92,7 @@ class ProcessWorker(Worker[Job, Answer]):
         from joblib.externals.loky.backend import get_context
 
         self._pool = ProcessPoolExecutor(max_workers=1, mp_context=get_context("loky"), initializer=_obey_the_parent)
-        self._pool.submit(_prepare, dumps(make))
+        self._prepared = self._pool.submit(_prepare, dumps(make))
 
     def submit(self, job: Job) -> "Future[Answer]":
         """See ``Worker``."""
@@ -99,6 +102,10 @@ class ProcessWorker(Worker[Job, Answer]):
     def close(self) -> None:
         """See ``Worker``."""
         self._pool.shutdown(wait=True)
+
+    def wait_until_ready(self) -> None:
+        """See ``Worker``; a process that does not start is an error of the first job's answer."""
+        self._prepared.exception()
 
 
 def answer_of(future: "Future[Answer]") -> Answer:

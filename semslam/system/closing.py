@@ -9,10 +9,11 @@ from semslam.backend.incremental import IncrementalPoseGraph
 from semslam.config import Config
 from semslam.loop.detector import NoLoops
 from semslam.loop.search import LoopSearch
-from semslam.loop.verification.verifier import LoopVerifier
+from semslam.loop.verification.verifier import LoopVerifier, build_verifier
 from semslam.runtime.stopwatch import Stopwatch
 from semslam.runtime.usage import ProcessUsage, usage_now
 from semslam.runtime.workers import Worker, WorkerKind, make_worker
+from semslam.system.shedding import SheddingVerifier
 from semslam.types import Frame, Keyframe, LabelMap, LoopConstraint, Transform, Verification
 
 
@@ -25,12 +26,14 @@ class KeyframeJob:
         frame: its images.
         odometry: from the keyframe before in the same map; None where a map begins.
         covisible: edges to keyframes that see the same landmarks.
+        behind: keyframes that wait behind it, where the run does not wait for loop closing.
     """
 
     keyframe: Keyframe
     frame: Frame
     odometry: Edge | None
     covisible: tuple[Edge, ...] = ()
+    behind: int = 0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -125,5 +128,12 @@ def build_closing(
 
 def _make_closing(config: Config, verifier: LoopVerifier | None) -> Callable[[KeyframeJob], KeyframeAnswer]:
     stopwatch = Stopwatch()
-    search = LoopSearch.from_config(config, stopwatch, verifier=verifier)
-    return LoopClosing(search, IncrementalPoseGraph(config.backend), stopwatch).close
+    shedding = SheddingVerifier(verifier or build_verifier(config), config.loops.max_behind)
+    search = LoopSearch.from_config(config, stopwatch, verifier=shedding)
+    closing = LoopClosing(search, IncrementalPoseGraph(config.backend), stopwatch)
+
+    def work(job: KeyframeJob) -> KeyframeAnswer:
+        shedding.behind = job.behind
+        return closing.close(job)
+
+    return work

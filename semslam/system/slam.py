@@ -1,8 +1,6 @@
 """The algorithm: a frame in, a state out. It reads no files, writes none and prints nothing."""
 
-from collections import deque
-from collections.abc import Callable
-from concurrent.futures import Future
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from typing import Self
 
@@ -19,8 +17,9 @@ from semslam.geometry.se3 import adjoint, invert, orthonormalise
 from semslam.loop.verification.verifier import LoopVerifier
 from semslam.plugins import load
 from semslam.runtime.stopwatch import Stopwatch
-from semslam.runtime.workers import Worker, WorkerKind, answer_of
+from semslam.runtime.workers import Worker, WorkerKind
 from semslam.system.closing import KeyframeAnswer, KeyframeJob, build_closing
+from semslam.system.keyframe_queue import CountedQueue, KeyframeQueue, RealTimeQueue
 from semslam.system.recovery import recover_poses
 from semslam.system.refinement import refine
 from semslam.system.result import FrameState, SlamResult
@@ -54,7 +53,7 @@ class Slam:
 
     Tracking never reads the loops, so that the result is the same wherever loop closing runs. Its answer for a
     keyframe moves the live poses from the frame at which ``loops.delay`` further keyframes have been made, never
-    sooner and never later.
+    sooner and never later. In real time it moves them once it is there, and nothing waits for it.
 
     Args:
         odometry: tracks frames.
@@ -64,6 +63,7 @@ class Slam:
         config: settings of the back end.
         stopwatch: collects stage times.
         listener: is handed each keyframe's answer when it is taken in, such as for a viewer.
+        realtime: whether tracking goes on without waiting for loop closing.
     """
 
     def __init__(
@@ -75,10 +75,12 @@ class Slam:
         config: Config,
         stopwatch: Stopwatch,
         listener: Callable[[KeyframeAnswer], None] = lambda answer: None,
+        realtime: bool = False,
     ) -> None:
         self._odometry = odometry
         self._builder = builder
         self._closing = closing
+        self._queue = None if closing is None else _queue(closing, config.loops.delay, realtime)
         self._graph = graph
         self._config = config
         self._stopwatch = stopwatch
@@ -87,7 +89,6 @@ class Slam:
         self._frames: list[FrameState] = []
         self._keyframes: list[Keyframe] = []
         self._outcomes: list[Verification] = []
-        self._pending: deque[Future[KeyframeAnswer]] = deque()
         self._T_world_odom: dict[int, Transform] = {}
         self._live_loops: dict[tuple[int, int], None] = {}
         self._observations: dict[int, Observations] = {}
@@ -101,6 +102,7 @@ class Slam:
         verifier: LoopVerifier | None = None,
         worker: WorkerKind = WorkerKind.NONE,
         listener: Callable[[KeyframeAnswer], None] = lambda answer: None,
+        realtime: bool = False,
     ) -> Self:
         """Build every part by its registered name.
 
@@ -110,6 +112,7 @@ class Slam:
             verifier: decides on candidates; None = the registered one.
             worker: where loops are closed; in a thread or process of its own tracking does not wait for them.
             listener: is handed each keyframe's answer when it is taken in.
+            realtime: whether tracking goes on without waiting for loop closing.
 
         Raises:
             ConfigError: a name is unknown.
@@ -124,6 +127,7 @@ class Slam:
             config=config,
             stopwatch=stopwatch or Stopwatch(),
             listener=listener,
+            realtime=realtime,
         )
 
     @property
@@ -157,6 +161,8 @@ class Slam:
         for anchor in self._anchors.values():
             anchor.extend(motion)
         keyframe = self._add_keyframe(read(), motion) if is_due else None
+        if self._queue is not None:
+            self._take_in(self._queue.due())
         state = FrameState(
             index=index,
             timestamp=timestamp,
@@ -174,7 +180,8 @@ class Slam:
         Raises:
             GraphError: nothing was tracked yet, or the optimiser failed.
         """
-        self._collect(leave=0)
+        if self._queue is not None:
+            self._take_in(self._queue.rest())
         with self._stopwatch.stage("optimize"):
             solution = self._graph.optimize()
         graph_poses = self._recover(solution)
@@ -200,12 +207,18 @@ class Slam:
 
     def leave_pending(self) -> None:
         """Do without the loops of keyframes that are still being closed, after one of them has failed."""
-        self._pending.clear()
+        if self._queue is not None:
+            self._queue.leave()
+
+    def wait_until_ready(self) -> None:
+        """Wait until loop closing has started."""
+        if self._closing is not None:
+            self._closing.wait_until_ready()
 
     def close(self) -> None:
         """End what runs beside tracking; the keyframes so far are still finished."""
-        if self._closing is not None:
-            self._closing.close()
+        if self._queue is not None:
+            self._queue.close()
 
     def _add_keyframe(self, frame: Frame, motion: Motion) -> Keyframe:
         with self._stopwatch.stage("keyframe"):
@@ -213,9 +226,8 @@ class Slam:
         self._keyframes.append(keyframe)
         odometry = self._connect(keyframe)
         covisible = self._observe(keyframe, motion.observations)
-        if self._closing is not None:
-            self._pending.append(self._closing.submit(KeyframeJob(keyframe, frame, odometry, covisible)))
-            self._collect(leave=self._config.loops.delay)
+        if self._queue is not None:
+            self._queue.add(KeyframeJob(keyframe, frame, odometry, covisible))
         return keyframe
 
     def _connect(self, keyframe: Keyframe) -> Edge | None:
@@ -236,10 +248,8 @@ class Slam:
         edges = self._covisibility.add(keyframe.id, keyframe.T_odom_cam, seen, keyframe.intrinsics)
         return tuple(self._graph.add_covisible(edge) for edge in edges)
 
-    def _collect(self, leave: int) -> None:
-        """Take in the answers for all keyframes but the last ``leave``, waiting for them where they are not there."""
-        while len(self._pending) > leave:
-            answer = answer_of(self._pending.popleft())
+    def _take_in(self, answers: Iterable[KeyframeAnswer]) -> None:
+        for answer in answers:
             self._listener(answer)
             self._stopwatch.add(answer.seconds)
             self._outcomes += answer.verifications
@@ -271,3 +281,7 @@ class Slam:
         """For each map of the odometry the place of its component in ``solution.components``, the largest first."""
         place = {key: index for index, keys in enumerate(solution.components) for key in keys}
         return {keyframe.map_id: place[keyframe.id] for keyframe in self._keyframes}
+
+
+def _queue(worker: Worker[KeyframeJob, KeyframeAnswer], delay: int, realtime: bool) -> KeyframeQueue:
+    return RealTimeQueue(worker) if realtime else CountedQueue(worker, delay)

@@ -98,6 +98,7 @@ class RejectionReason(StrEnum):
     INCONSISTENT = "inconsistent"
     AMBIGUOUS = "ambiguous"
     OUTLIER = "outlier"
+    SHED = "shed"
 
 
 @dataclass(frozen=True, slots=True)

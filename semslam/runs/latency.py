@@ -1,0 +1,66 @@
+"""How long frames and loops take from their coming to their effect."""
+
+import time
+from collections.abc import Sequence
+
+import numpy as np
+
+from semslam.runs.metrics import Latency
+
+
+class Latencies:
+    """Notes when frames come and are done, and when loops move the live poses; reported, and deciding nothing."""
+
+    def __init__(self) -> None:
+        self._begun = self._came = time.perf_counter()
+        self._tracking: list[float] = []
+        self._lag: list[float] = []
+        self._loops: list[float] = []
+        self._keyframes: dict[int, float] = {}
+
+    def begin(self, came: float | None = None) -> None:
+        """A frame is taken up.
+
+        Args:
+            came: when it came, in seconds of ``time.perf_counter``; None = now.
+        """
+        self._begun = time.perf_counter()
+        self._came = self._begun if came is None else came
+
+    def done(self, keyframe: int | None) -> None:
+        """Its pose is known.
+
+        Args:
+            keyframe: the keyframe that it has become, if any.
+        """
+        now = time.perf_counter()
+        self._tracking.append(now - self._begun)
+        self._lag.append(now - self._came)
+        if keyframe is not None:
+            self._keyframes[keyframe] = self._came
+
+    def loop(self, keyframe: int) -> None:
+        """A loop of a keyframe moves the poses from now on."""
+        self._loops.append(time.perf_counter() - self._keyframes.get(keyframe, self._came))
+
+    @property
+    def tracking_ms(self) -> Latency | None:
+        """Milliseconds that tracking took for a frame."""
+        return _latency(self._tracking, 1e3)
+
+    @property
+    def lag_ms(self) -> Latency | None:
+        """Milliseconds from a frame's coming to its pose."""
+        return _latency(self._lag, 1e3)
+
+    @property
+    def loop_s(self) -> Latency | None:
+        """Seconds from a keyframe's coming to the effect of its loops."""
+        return _latency(self._loops, 1.0)
+
+
+def _latency(seconds: Sequence[float], unit: float) -> Latency | None:
+    if not seconds:
+        return None
+    median, p95, p99, worst = np.round(unit * np.quantile(seconds, [0.5, 0.95, 0.99, 1.0]), 4).tolist()
+    return Latency(median=median, p95=p95, p99=p99, worst=worst)
