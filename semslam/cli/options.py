@@ -71,6 +71,10 @@ Seed = Annotated[int | None, typer.Option("--seed", min=0, max=2**31 - 1, help="
 Start = Annotated[int, typer.Option("--start", min=0, max=MOST, help="First frame.")]
 MaxFrames = Annotated[int | None, typer.Option("--max-frames", min=1, max=MOST, help="Maximum number of frames.")]
 Stride = Annotated[int, typer.Option("--stride", min=1, max=MOST, help="Take every n-th frame.")]
+Inject = Annotated[
+    str | None,
+    typer.Option("--inject", help="Faults put into the sequence: black=30-60,drop=0.1,seed=1 (see docs/datasets.md)."),
+]
 Plots = Annotated[bool, typer.Option("--plots/--no-plots", help="Draw plots and the report.")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON on standard output.")]
 

@@ -44,6 +44,7 @@ def run_command(
     max_frames: options.MaxFrames = None,
     stride: options.Stride = 1,
     loader: options.Loader = None,
+    inject: options.Inject = None,
     plots: options.Plots = True,
     visualize: Visualize = False,
     rerun_file: RerunFile = None,
@@ -54,6 +55,7 @@ def run_command(
     ] = None,
 ) -> None:
     """Run SLAM over a sequence and write a run folder."""
+    from semslam.config import parse_faults
     from semslam.datasets import open_dataset
     from semslam.datasets.realtime import RealTimeFeed
     from semslam.runs.place import link_latest, reserved, reserved_anew
@@ -73,6 +75,7 @@ def run_command(
                 start,
                 max_frames,
                 loader,
+                inject,
                 stride > 1,
                 realtime,
                 rate,
@@ -91,6 +94,8 @@ def run_command(
         raise ConfigError("--from takes the saved run's settings; change them with --set, not with --config.")
     base = config if saved is None else saved.config
     chosen = options.settings(base, overrides, odometry, detector, seed, loader, start, max_frames, stride)
+    if inject is not None:
+        chosen = chosen.with_changes(dataset={"faults": parse_faults(inject)})
     source = _source(sequence, saved)
     if saved is not None:
         saved.check_settings(chosen)
@@ -176,6 +181,7 @@ COMMANDS = (
             "semslam run DIR --set keyframes.interval=0.5",
             "semslam run --from runs/latest --detector fused",
             "semslam run recording.bag --realtime",
+            "semslam run DIR --inject black=2-3,drop=0.1",
         ),
     ),
 )

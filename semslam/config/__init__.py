@@ -4,7 +4,8 @@ Settings of a single implementation, such as one odometry, stand beside it.
 """
 
 from semslam.config.backend import BackendConfig, BundleConfig, CovisibilityConfig
-from semslam.config.dataset import DatasetConfig, FaultConfig, Interval
+from semslam.config.dataset import DatasetConfig
+from semslam.config.faults import FaultConfig, Interval, parse_faults, written_faults
 from semslam.config.keyframes import KeyframeConfig
 from semslam.config.keypoints import KeypointConfig
 from semslam.config.loops import LoopConfig
@@ -31,6 +32,8 @@ __all__ = [
     "VerificationConfig",
     "load_config",
     "load_saved_config",
+    "parse_faults",
     "parse_overrides",
     "setting",
+    "written_faults",
 ]

@@ -3,23 +3,8 @@
 from pathlib import Path
 from typing import Literal
 
+from semslam.config.faults import FaultConfig
 from semslam.config.section import Section, setting
-
-Interval = tuple[float, float]
-
-
-class FaultConfig(Section):
-    """Faults injected into a sequence; intervals are (from, to) in seconds since its first frame."""
-
-    drop: float = setting(0.0, "share of frames dropped at random", ge=0, lt=1)
-    unreadable: float = setting(0.0, "share of frames whose image cannot be read, at random", ge=0, lt=1)
-    gaps: tuple[Interval, ...] = setting((), "intervals without frames", unit="s")
-    black: tuple[Interval, ...] = setting((), "intervals of black colour images", unit="s")
-    no_depth: tuple[Interval, ...] = setting((), "intervals without depth", unit="s")
-    nan_depth: tuple[Interval, ...] = setting((), "intervals in which half of the depth values are NaN", unit="s")
-    blur: tuple[Interval, ...] = setting((), "intervals of strong motion blur", unit="s")
-    frozen: tuple[Interval, ...] = setting((), "intervals in which the image before them is repeated", unit="s")
-    seed: int = setting(0, "seed of the random faults", ge=0)
 
 
 class DatasetConfig(Section):

@@ -1,6 +1,7 @@
 """Faults put into a sequence on purpose, to see what becomes of the stages behind.
 
-What each fault does to the sequence, and what has to come of it:
+``semslam run --inject SPEC`` and the settings ``dataset.faults`` put them in. What each does to the sequence, and what
+has to come of it:
 
 | fault | in the sequence | expected outcome |
 |---|---|---|
@@ -12,6 +13,7 @@ What each fault does to the sequence, and what has to come of it:
 | frozen | the image before the interval is repeated | no motion is reported; none is invented afterwards |
 | no_depth | depth is all zero | the frames are lost or degraded; nothing divides by zero |
 | nan_depth | half of the depth values are NaN | as if those pixels had none: no NaN leaves the front end |
+| foreign | reading raises an error of another library | the run ends there; what was tracked is written |
 """
 
 from dataclasses import replace
@@ -19,7 +21,8 @@ from dataclasses import replace
 import cv2
 import numpy as np
 
-from semslam.config import FaultConfig, Interval
+from semslam.config import FaultConfig, Interval, written_faults
+from semslam.config.faults import INTERVALS
 from semslam.datasets.dataset import Dataset
 from semslam.datasets.selection import ChosenFrames
 from semslam.errors import DatasetError
@@ -54,19 +57,28 @@ class FaultyDataset(ChosenFrames):
 
     @property
     def notes(self) -> list[str]:
-        """Notes of the sound sequence, and which faults were put in."""
-        return [*self._dataset.notes, f"Faults were put in on purpose: {self._describe()}."]
+        """Notes of the sound sequence, which faults were put in, and which of them no frame meets."""
+        missed = [
+            f"No frame lies within {name}={begin:g}-{end:g}: the sequence takes {self._elapsed[-1]:.1f} s."
+            for name in INTERVALS
+            for begin, end in getattr(self._config, name)
+            if not ((self._elapsed >= begin) & (self._elapsed < end)).any()
+        ]
+        return [*self._dataset.notes, f"Faults were put in on purpose: {written_faults(self._config)}.", *missed]
 
     def frame(self, index: int) -> Frame:
         """Read a frame and damage it as its time demands.
 
         Raises:
             DatasetError: the image is not readable, or was made so.
+            RuntimeError: an error of another library is wanted here.
             IndexError: there is no such frame.
         """
         source = self._source(index)
         if self._unreadable[source]:
             raise DatasetError(f"Frame {source} of {self.name} was made unreadable on purpose.")
+        if self._hits(self._config.foreign, source):
+            raise RuntimeError(f"frame {source} of {self.name} raises this on purpose")
         frame = self._dataset.frame(self._source_of_image(source))
         color, depth = frame.color, frame.depth
         if self._hits(self._config.black, source):
@@ -90,7 +102,3 @@ class FaultyDataset(ChosenFrames):
             if begin <= self._elapsed[source] < end:
                 return max(0, int(np.searchsorted(self._elapsed, begin)) - 1)
         return source
-
-    def _describe(self) -> str:
-        chosen = self._config.model_dump(exclude_defaults=True)
-        return ", ".join(f"{name}={value}" for name, value in chosen.items())

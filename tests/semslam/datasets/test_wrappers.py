@@ -184,3 +184,11 @@ def test_faults_are_of_the_same_images_whichever_frames_are_read() -> None:
                 chosen.frame(index)
         else:
             assert np.array_equal(chosen.frame(index).color, expected.color)
+
+
+def test_faults_state_what_they_are_and_what_they_miss() -> None:
+    faulty = FaultyDataset(Counting(), FaultConfig(black=((0.0, 1.0), (100.0, 101.0)), foreign=((0.3, 0.5),)))
+    assert faulty.notes[0] == "Faults were put in on purpose: black=0.0-1.0,black=100.0-101.0,foreign=0.3-0.5."
+    assert faulty.notes[1].startswith("No frame lies within black=100-101")
+    with pytest.raises(RuntimeError, match="on purpose"):
+        faulty.frame(4)
