@@ -52,7 +52,7 @@ class ModelError(SemslamError):
     """Network weights are missing, of another network, or damaged."""
 
 
-def as_our_own(error: Exception) -> SemslamError:
+def as_our_own(error: BaseException) -> SemslamError:
     """An error of any kind as one clear sentence."""
     if isinstance(error, SemslamError):
         return error

@@ -1,18 +1,20 @@
 """Which implementation has which name: explicit tables, plus entry points of installed packages.
 
 A table maps a name to ``"module:Class"``; the module is imported when the name is asked for. Every class fills the
-protocol of its role and has a class method ``from_config(config)``. Settings of its own are a ``Section`` that the
-class attribute ``Settings`` names; they form the section of the same name (dashes become underscores).
+protocol of its role and has a class method ``from_config(config)``; one from outside is held against it when it is
+loaded. Settings of its own are a ``Section`` that the class attribute ``Settings`` names; they form the section of the
+same name (dashes become underscores).
 """
 
 import difflib
-import warnings
+import inspect
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from importlib import import_module
-from importlib.metadata import entry_points
+from importlib.metadata import EntryPoint, entry_points
 from typing import TYPE_CHECKING, Any, Literal, overload
 
-from semslam.errors import ConfigError, SemslamWarning
+from semslam.errors import ConfigError, as_our_own
 
 if TYPE_CHECKING:
     from semslam.backend.robust.strategy import RobustStrategy
@@ -84,20 +86,38 @@ GROUPS: dict[Group, Mapping[str, str]] = {
     "semslam.robust": ROBUST,
     "semslam.datasets": DATASETS,
 }
-NOUNS: dict[Group, str] = {
-    "semslam.odometry": "odometry",
-    "semslam.detectors": "loop detector",
-    "semslam.segmenters": "segmenter",
-    "semslam.verifiers": "loop verifier",
-    "semslam.robust": "robust strategy",
-    "semslam.datasets": "dataset loader",
+
+
+@dataclass(frozen=True, slots=True)
+class Role:
+    """What a class of a group must have, as far as it can be seen without building one.
+
+    Attributes:
+        noun: what it is called in messages.
+        attributes: of the class; what instances alone may have is not among them.
+        methods: how many arguments each is called with, besides the class or the instance.
+    """
+
+    noun: str
+    attributes: tuple[str, ...]
+    methods: Mapping[str, int]
+
+
+ROLES: dict[Group, Role] = {
+    "semslam.odometry": Role("odometry", ("name", "reads"), {"from_config": 1, "track": 1}),
+    "semslam.detectors": Role("loop detector", ("name", "needs_labels"), {"from_config": 1, "query": 1, "add": 1}),
+    "semslam.segmenters": Role("segmenter", ("name",), {"from_config": 1, "segment": 2}),
+    "semslam.verifiers": Role("loop verifier", ("name",), {"from_config": 1, "verify": 3}),
+    "semslam.robust": Role("robust strategy", ("name", "accepts_all"), {"from_config": 1, "solve": 1}),
+    "semslam.datasets": Role(
+        "dataset loader", ("layout",), {"recognises": 1, "open": 2, "frame": 1, "__len__": 0, "__iter__": 0}
+    ),
 }
 
 
 def names(group: Group) -> list[str]:
     """All known names of a group: the built-in ones first, then those of installed plug-ins."""
-    own = list(GROUPS[group])
-    return own + sorted(e.name for e in entry_points(group=group) if e.name not in own)
+    return [*GROUPS[group], *sorted(outside(group))]
 
 
 def check(group: Group, name: str) -> None:
@@ -112,7 +132,7 @@ def check(group: Group, name: str) -> None:
     if name not in known:
         close = difflib.get_close_matches(name, known, n=1)
         hint = f" Did you mean '{close[0]}'?" if close else ""
-        raise ConfigError(f"There is no {NOUNS[group]} '{name}'.{hint} Known: {', '.join(known)}.")
+        raise ConfigError(f"There is no {ROLES[group].noun} '{name}'.{hint} Known: {', '.join(known)}.")
 
 
 @overload
@@ -135,20 +155,57 @@ def load(group: Group, name: str) -> type[Any]:
     """Import the class of that name.
 
     Raises:
-        ConfigError: the name is unknown (the message lists the known ones) or its plug-in does not import.
+        ConfigError: the name is unknown (the message lists the known ones), or its plug-in does not import or lacks
+            something that its role has.
     """
     check(group, name)
     if name in GROUPS[group]:
         module, _, attribute = GROUPS[group][name].partition(":")
         found: type[Any] = getattr(import_module(module), attribute)
         return found
-    entry = next(entry for entry in entry_points(group=group) if entry.name == name)
+    entry = outside(group)[name]
     try:
         loaded: type[Any] = entry.load()
-    except Exception as error:  # a plug-in may fail in any way it likes
-        warnings.warn(f"The plug-in {entry.value} is broken: {error!r}", SemslamWarning, stacklevel=2)
-        raise ConfigError(f"The plug-in '{name}' ({entry.value}) does not import: {error}.") from error
+    except (Exception, SystemExit) as error:  # a plug-in may fail in any way it likes
+        raise ConfigError(f"The plug-in '{name}' ({entry.value}) does not import: {as_our_own(error)}") from error
+    lacks = _lacks(ROLES[group], name, loaded)
+    if lacks is not None:
+        raise ConfigError(f"The plug-in '{name}' ({entry.value}) is no {ROLES[group].noun}: {lacks}.")
     return loaded
+
+
+def outside(group: Group) -> dict[str, EntryPoint]:
+    """What installed packages add to a group, by name; a name of ours stays ours."""
+    return {entry.name: entry for entry in entry_points(group=group) if entry.name not in GROUPS[group]}
+
+
+def _lacks(role: Role, name: str, loaded: object) -> str | None:
+    """What keeps a class from filling a role, or None."""
+    if not isinstance(loaded, type):
+        return "it is no class"
+    for attribute in (*role.attributes, *role.methods):
+        if not hasattr(loaded, attribute):
+            return f"it has no '{attribute}'"
+    stated = getattr(loaded, "name", name) if "name" in role.attributes else name
+    if isinstance(stated, str) and stated != name:
+        return f"its name is '{stated}', not '{name}'"
+    for method, count in role.methods.items():
+        if not _takes(loaded, method, count):
+            return f"'{method}' does not take {count} argument{'' if count == 1 else 's'}"
+    return None
+
+
+def _takes(loaded: type, method: str, count: int) -> bool:
+    """Whether a method can be called with so many arguments besides its class or instance."""
+    function = getattr(loaded, method)
+    bound = inspect.ismethod(function) or isinstance(inspect.getattr_static(loaded, method), staticmethod)
+    try:
+        inspect.signature(function).bind(*[None] * (count if bound else count + 1))
+    except TypeError:
+        return False
+    except ValueError:  # written in another language, it may state no signature
+        return True
+    return True
 
 
 def named(name: str) -> Iterator[tuple[Group, str]]:

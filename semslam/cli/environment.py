@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from semslam import plugins
 from semslam.cli import options
 from semslam.cli.command import Command, example
 from semslam.cli.console import out
@@ -47,7 +48,6 @@ def config_command(
 
 def doctor_command() -> None:
     """Check that everything a run needs is here."""
-    from semslam import plugins
     from semslam.config import Config
 
     problems: list[str] = []
@@ -68,6 +68,10 @@ def doctor_command() -> None:
         problems.append("segmentation network")
     for group in plugins.GROUPS:
         out.print(f"{group}: {', '.join(plugins.names(group))}", soft_wrap=True)
+        for name, entry in plugins.outside(group).items():
+            found = _check(group, name)
+            out.print(f"plug-in {name} ({entry.value}): {found or 'usable'}", soft_wrap=True)
+            problems += [f"plug-in {name}"] if found else []
     if problems:
         raise SemslamError(f"Not usable here: {', '.join(problems)}.")
     out.print("All is well.")
@@ -99,6 +103,17 @@ def download_command(
     with bar(name, None, "bytes") as update:
         path = download(name, directory, progress=update, base_url=base_url or BASE_URL)
     out.print(f"Unpacked to {path}", soft_wrap=True)
+
+
+def _check(group: plugins.Group, name: str) -> str:
+    """Why a plug-in cannot be used; empty where it can."""
+    from semslam.config.settings import check_plugin
+
+    try:
+        check_plugin(group, name)
+    except ConfigError as error:
+        return str(error)
+    return ""
 
 
 def _import_version(package: str) -> str:

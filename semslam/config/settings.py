@@ -1,5 +1,6 @@
 """All settings joined in ``Config``."""
 
+import warnings
 from collections.abc import Mapping
 from functools import lru_cache
 from typing import Any, Self, TypeVar
@@ -17,7 +18,7 @@ from semslam.config.loops import LoopConfig
 from semslam.config.section import Section, setting
 from semslam.config.segmentation import SegmentationConfig, TrainingConfig
 from semslam.config.verification import VerificationConfig
-from semslam.errors import ConfigError, shortened
+from semslam.errors import ConfigError, SemslamWarning, as_our_own, shortened
 
 SectionT = TypeVar("SectionT", bound=Section)
 
@@ -80,18 +81,24 @@ class Config(Section):
         return config
 
     def check_names(self) -> None:
-        """Make sure that everything named here is registered.
+        """Make sure that everything named here is registered, and that plug-ins among it can be used.
 
         Raises:
-            ConfigError: a name is unknown; the message lists the known ones.
+            ConfigError: a name is unknown (the message lists the known ones), or a plug-in lacks something.
         """
-        plugins.check("semslam.odometry", self.odometry)
-        plugins.check("semslam.detectors", self.detector)
-        plugins.check("semslam.segmenters", self.segmentation.name)
-        plugins.check("semslam.verifiers", self.verification.name)
-        plugins.check("semslam.robust", self.backend.robust)
-        if self.dataset.loader is not None:
-            plugins.check("semslam.datasets", self.dataset.loader)
+        chosen: list[tuple[plugins.Group, str | None]] = [
+            ("semslam.odometry", self.odometry),
+            ("semslam.detectors", self.detector),
+            ("semslam.segmenters", self.segmentation.name),
+            ("semslam.verifiers", self.verification.name),
+            ("semslam.robust", self.backend.robust),
+            ("semslam.datasets", self.dataset.loader),
+        ]
+        for group, name in chosen:
+            if name is not None:
+                plugins.check(group, name)
+                if name not in plugins.GROUPS[group]:
+                    check_plugin(group, name)
 
     def with_all_sections(self) -> dict[str, Section]:
         """All sections by name, those of all registered implementations included."""
@@ -121,11 +128,29 @@ def own_settings(name: str) -> type[Section] | None:
     for group, known in plugins.named(name):
         try:
             declared = vars(plugins.load(group, known)).get("Settings")
-        except ConfigError:  # a broken plug-in has been warned of, and must not stop a run that does without it
+        except ConfigError as error:  # a broken plug-in must not stop a run that does without it
+            warnings.warn(str(error), SemslamWarning, stacklevel=2)
             continue
         if isinstance(declared, type) and issubclass(declared, Section):
             return declared
     return None
+
+
+def check_plugin(group: plugins.Group, name: str) -> None:
+    """Load an implementation from outside, and make sure that it fills its role and declares settings as asked.
+
+    Raises:
+        ConfigError: it cannot be used; the sentence states what is wrong.
+    """
+    declared = vars(plugins.load(group, name)).get("Settings")
+    if declared is None:
+        return
+    try:
+        if not (isinstance(declared, type) and issubclass(declared, Section)):
+            raise TypeError("they are no semslam.config.Section")
+        declared()
+    except Exception as error:  # a default may be out of its own range, or be computed
+        raise ConfigError(f"The plug-in '{name}' has unusable Settings: {as_our_own(error)}") from error
 
 
 def merged(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:

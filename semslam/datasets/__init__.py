@@ -4,12 +4,13 @@ dataset = open_dataset("rgbd_dataset_freiburg1_room")
 for frame in dataset: ...
 """
 
+import warnings
 from pathlib import Path
 
 from semslam import plugins
 from semslam.config import DatasetConfig
 from semslam.datasets.dataset import Dataset, DatasetLoader
-from semslam.errors import ConfigError, DatasetError
+from semslam.errors import ConfigError, DatasetError, SemslamWarning, as_our_own
 
 __all__ = ["Dataset", "DatasetLoader", "open_dataset"]
 
@@ -49,6 +50,8 @@ def open_dataset(path: str | Path, config: DatasetConfig | None = None, *, loade
         raise DatasetError(f"{path} cannot be read: {error.strerror or error}.") from error
     except UnicodeError as error:
         raise DatasetError(f"{path} is no path.") from error
+    except Exception as error:  # a loader from outside may raise what it likes
+        raise as_our_own(error) from error
     if config.faults != type(config.faults)():
         from semslam.datasets.faults import FaultyDataset
 
@@ -88,9 +91,13 @@ def guess_loader(path: str | Path) -> str:
             continue
         try:
             loader: type[DatasetLoader] = plugins.load("semslam.datasets", name)
-        except ConfigError:  # a broken plug-in has been warned of; it must not keep the others from being asked
+            its_own = loader.recognises(place)
+        except Exception as error:  # a broken plug-in must not keep the others from being asked
+            if name in plugins.DATASETS:
+                raise
+            warnings.warn(f"The loader '{name}' is passed over: {as_our_own(error)}", SemslamWarning, stacklevel=2)
             continue
-        if loader.recognises(place):
+        if its_own:
             return name
         looked_for.append(loader.layout)
     raise DatasetError(f"{place} is no sequence: looked for {'; '.join(looked_for)}.")

@@ -51,9 +51,12 @@ class Session:
         self._dataset, self._config, self._journal, self._feed = dataset, config, journal, feed
         self._viewer = viewer or NoViewer()
         self._stopwatch, self._clock, self._latencies = Stopwatch(), RunClock(), Latencies()
-        worker = _worker(config, len(dataset), feed is not None)
         realtime = feed is not None
-        self._slam = Slam.from_config(config, self._stopwatch, verifier, worker, self._show_answer, realtime)
+        worker = _worker(config, len(dataset), realtime)
+        try:
+            self._slam = Slam.from_config(config, self._stopwatch, verifier, worker, self._show_answer, realtime)
+        except Exception as error:  # what a part from outside raises when it is built
+            raise as_our_own(error) from error
         self._unreadable: list[str] = []
         self._checksum = 0
         self._interrupted = False
