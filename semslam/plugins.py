@@ -68,6 +68,7 @@ DATASETS: dict[str, str] = {
     "folder": "semslam.datasets.folder:FolderDataset",
     "rosbag": "semslam.datasets.rosbag:RosbagDataset",
     "synthetic": "semslam.datasets.synthetic:SyntheticDataset",
+    "sessions": "semslam.datasets.sessions:SessionsDataset",
 }
 
 Group = Literal[

@@ -9,7 +9,7 @@ from typing import TextIO
 import typer
 
 from semslam import __version__
-from semslam.cli import checks, environment, exports, graphs, maps, models, pictures, runs, scores, sweeps
+from semslam.cli import checks, environment, exports, graphs, maps, merging, models, pictures, runs, scores, sweeps
 from semslam.cli.console import complain, remark
 from semslam.errors import SemslamError, SemslamWarning
 
@@ -39,7 +39,7 @@ def root(
     """RGB-D SLAM whose loop closures come from semantics."""
 
 
-for module in (runs, sweeps, checks, pictures, scores, exports, maps, graphs, models, environment):
+for module in (runs, sweeps, checks, pictures, scores, exports, maps, merging, graphs, models, environment):
     for command in module.COMMANDS:
         app.command(command.name, help=command.help, epilog=command.epilog)(command.run)
 

@@ -117,9 +117,16 @@ def checksum(frame: Frame) -> int:
 
 
 def write_recording(directory: Path, recording: Recording, source: str | None = None) -> None:
-    """Write a recording, and what the sequence was opened by, into a run folder; the same one gives the same bytes."""
+    """Write a recording into a run folder, and what the sequence was opened by; the same one gives the same bytes.
+
+    Args:
+        directory: the run folder.
+        recording: what the front end made of the sequence.
+        source: what the sequence was opened by; the name of a file in the folder stays as it is.
+    """
     if source is not None:
-        place = Path(source).resolve() if Path(source).exists() else source
+        elsewhere = Path(source).exists() and not (directory / source).exists()
+        place = Path(source).resolve() if elsewhere else source
         (directory / SOURCE).write_text(f"{place}\n", encoding="utf-8")
     motions = [frame.motion for frame in recording.frames]
     seen = [motion.observations for motion in motions if motion.observations is not None]
@@ -165,7 +172,9 @@ def read_source(directory: Path) -> str | None:
     if SOURCE not in manifest.files:
         return None
     manifest.check(directory, SOURCE)
-    return (directory / SOURCE).read_text(encoding="utf-8").strip()
+    source = (directory / SOURCE).read_text(encoding="utf-8").strip()
+    inside = directory / source
+    return str(inside) if inside.exists() else source
 
 
 def read_recording(directory: Path) -> Recording:

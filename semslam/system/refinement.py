@@ -4,13 +4,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
+import numpy as np
+
 from semslam.backend.bundle.bundle import adjust
 from semslam.backend.bundle.tracks import MatchedFeatures, join_tracks
 from semslam.backend.pose_graph import Edge, GraphSolution
 from semslam.backend.robust.repetition import discounted
 from semslam.config import Config
 from semslam.loop.verification.neighbours import shared_features
-from semslam.types import Keyframe, Observations
+from semslam.types import Intrinsics, Keyframe, Observations
 
 SEEN_TWICE = {"min_views": 2}
 """Features that closures share are no part of odometry, so that two views of one already add information."""
@@ -45,8 +47,20 @@ def refine(
     else:
         return solution
     edges = (*solution.odometry, *loops, *solution.covisible)
-    result = adjust(solution.poses, observations, keyframes[0].intrinsics, settings, edges)
+    camera = keyframes[0].intrinsics
+    observations = {key: _as_seen_by(camera, keyframes[key].intrinsics, seen) for key, seen in observations.items()}
+    result = adjust(solution.poses, observations, camera, settings, edges)
     return replace(solution, poses=result.poses)
+
+
+def _as_seen_by(camera: Intrinsics, own: Intrinsics, seen: Observations) -> Observations:
+    """Observations in the pixels of another camera at the same place; merged sessions may have different ones."""
+    if (own.fx, own.fy, own.cx, own.cy) == (camera.fx, camera.fy, camera.cx, camera.cy):
+        return seen
+    scale = np.array([camera.fx / own.fx, camera.fy / own.fy])
+    pixels = (seen.pixels - (own.cx, own.cy)) * scale + (camera.cx, camera.cy)
+    sigmas = np.ones_like(seen.depths) if seen.sigmas is None else seen.sigmas
+    return replace(seen, pixels=pixels.astype(np.float32), sigmas=(sigmas * scale[0]).astype(np.float32))
 
 
 def _shared(solution: GraphSolution, keyframes: Sequence[Keyframe], config: Config) -> dict[int, Observations]:

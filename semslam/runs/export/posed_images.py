@@ -30,7 +30,7 @@ def posed_frames(run: SavedRun, dataset: Dataset) -> Iterator[tuple[str, FloatAr
     """Name, T_world_cam and images of each keyframe of a run's largest map.
 
     Raises:
-        ResultsError: the dataset is another sequence than the run's.
+        ResultsError: the dataset is another sequence than the run's, or holds images of several cameras.
         DatasetError: an image cannot be read.
     """
     index_at = {f"{stamp:.9f}": index for index, stamp in enumerate(dataset.timestamps)}
@@ -38,7 +38,10 @@ def posed_frames(run: SavedRun, dataset: Dataset) -> Iterator[tuple[str, FloatAr
         index = index_at.get(f"{stamp:.9f}")
         if index is None:
             raise ResultsError(f"{dataset.name} is not the sequence of {run.directory}: it has no frame at {stamp} s.")
-        yield f"{index:06d}.png", pose, dataset.frame(index)
+        frame = dataset.frame(index)
+        if frame.intrinsics != dataset.intrinsics:
+            raise ResultsError(f"{run.directory} holds images of several cameras; export each session by itself.")
+        yield f"{index:06d}.png", pose, frame
 
 
 def write_posed_images(run: SavedRun, dataset: Dataset, directory: Path, depth: bool) -> list[PosedImage]:

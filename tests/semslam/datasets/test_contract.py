@@ -11,6 +11,7 @@ from semslam import plugins
 from semslam.config import DatasetConfig, FaultConfig
 from semslam.datasets import Dataset, guess_loader, open_dataset
 from semslam.datasets.camera_file import write_camera
+from semslam.datasets.sessions import SESSIONS, Session, SessionList
 from semslam.geometry.camera import Intrinsics
 from semslam.testing import DatasetContract
 
@@ -108,12 +109,19 @@ def make_rosbag(folder: Path) -> Path:
     return folder / "some.bag"
 
 
+def make_sessions(folder: Path) -> Path:
+    first, second = Session(source=str(make_tum(folder))), Session(source=str(make_tum(folder)), shift=10.0)
+    SessionList(sessions=(first, second), one_truth=True).write(folder / SESSIONS)
+    return folder / SESSIONS
+
+
 MAKERS: dict[str, Callable[[Path], Path | str]] = {
     "tum": make_tum,
     "folder": make_folder,
     "seven_scenes": make_seven_scenes,
     "rosbag": make_rosbag,
     "synthetic": lambda _: "synthetic",
+    "sessions": make_sessions,
 }
 
 

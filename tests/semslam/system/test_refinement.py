@@ -136,3 +136,18 @@ def test_neighbours_share_what_both_see() -> None:
     assert (seen_after[rows[:, 0]] == seen_before[rows[:, 1]]).mean() > 0.99
     elsewhere, _ = make_keyframe(2, np.eye(4), points, np.roll(descriptors, 1, axis=0))
     assert shared_features(elsewhere, before, CONFIG.verification, 0) is None
+
+
+def test_keyframes_of_two_cameras_are_adjusted_together(
+    two_laps: tuple[FloatArray, list[Keyframe], GraphSolution],
+) -> None:
+    truth, keyframes, solution = two_laps
+    other = Intrinsics(320, 240, 250.0, 260.0, 150.0, 130.0)
+
+    def through_other(keyframe: Keyframe) -> Keyframe:
+        rays = (keyframe.features.pixels - (CAMERA.cx, CAMERA.cy)) / (CAMERA.fx, CAMERA.fy)
+        pixels = (rays * (other.fx, other.fy) + (other.cx, other.cy)).astype(np.float32)
+        return replace(keyframe, intrinsics=other, features=replace(keyframe.features, pixels=pixels))
+
+    mixed = [through_other(k) if k.id >= PER_LAP else k for k in keyframes]
+    assert error(refine(solution, mixed, {}, CONFIG), truth) < 0.5 * error(solution, truth)
