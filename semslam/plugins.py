@@ -63,7 +63,13 @@ ROBUST: dict[str, str] = {
     "none": "semslam.backend.robust.least_squares:LeastSquares",
 }
 DATASETS: dict[str, str] = {
+    "vslam_lab": "semslam.datasets.vslam_lab:VslamLabDataset",
+    "openloris": "semslam.datasets.openloris:OpenLorisDataset",
     "tum": "semslam.datasets.tum:TumDataset",
+    "replica": "semslam.datasets.replica:ReplicaDataset",
+    "scannet": "semslam.datasets.scannet:ScanNetDataset",
+    "tartanair": "semslam.datasets.tartanair:TartanAirDataset",
+    "redwood": "semslam.datasets.redwood:RedwoodDataset",
     "seven_scenes": "semslam.datasets.seven_scenes:SevenScenesDataset",
     "folder": "semslam.datasets.folder:FolderDataset",
     "rosbag": "semslam.datasets.rosbag:RosbagDataset",

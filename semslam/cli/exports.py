@@ -23,12 +23,19 @@ class Target(StrEnum):
     TUM = "tum"
     KITTI = "kitti"
     EUROC = "euroc"
+    VSLAM_LAB = "vslam-lab"
     EVO = "evo"
     COLMAP = "colmap"
     NERFSTUDIO = "nerfstudio"
 
 
-SUFFIXES = {Target.TUM: ".txt", Target.KITTI: ".kitti.txt", Target.EUROC: ".csv", Target.EVO: ".zip"}
+SUFFIXES = {
+    Target.TUM: ".txt",
+    Target.KITTI: ".kitti.txt",
+    Target.EUROC: ".csv",
+    Target.VSLAM_LAB: ".csv",
+    Target.EVO: ".zip",
+}
 
 
 def export_command(
@@ -96,8 +103,9 @@ def _trajectory(source: Path, rate: float | None) -> "Trajectory":
 
 
 def _write_images(run: "SavedRun", target: Target, directory: Path, sequence: str | None) -> int:
-    from semslam.runs.export.colmap import write_colmap
-    from semslam.runs.export.nerfstudio import write_nerfstudio
+    from semslam.runs.export.colmap import COLMAP
+    from semslam.runs.export.nerfstudio import NERFSTUDIO
+    from semslam.runs.export.posed_images import write_model
     from semslam.runs.files import writing
     from semslam.runs.saved_views import open_saved
 
@@ -106,14 +114,14 @@ def _write_images(run: "SavedRun", target: Target, directory: Path, sequence: st
         if directory.exists() and any(directory.iterdir()):
             raise ResultsError(f"{directory} is not empty; name another folder with --out.")
         directory.mkdir(parents=True, exist_ok=True)
-        return (write_colmap if target is Target.COLMAP else write_nerfstudio)(run, dataset, directory)
+        return write_model(run, dataset, directory, COLMAP if target is Target.COLMAP else NERFSTUDIO)
 
 
 COMMANDS = (
     Command(
         "export",
         export_command,
-        "Write a run for other tools: TUM, KITTI or EuRoC trajectory, evo's result, COLMAP's or nerfstudio's model.",
+        "Write a run for other tools: TUM, KITTI, EuRoC, VSLAM-LAB, evo, COLMAP, nerfstudio.",
         example(
             "semslam export runs/latest --to evo --out semantic.zip",
             "semslam export runs/latest --to nerfstudio --out scene",

@@ -10,7 +10,7 @@ from semslam.config.strict_yaml import load_yaml
 from semslam.datasets.images import DepthScale
 from semslam.errors import ConfigError, DatasetError, shortened
 from semslam.files import read_text
-from semslam.geometry.camera import NO_DISTORTION, Intrinsics
+from semslam.geometry.camera import COEFFICIENTS, NO_DISTORTION, Intrinsics
 
 CAMERA_FILE = "camera.yaml"
 _REQUIRED = ("width", "height", "fx", "fy", "cx", "cy")
@@ -45,7 +45,8 @@ class CameraSetup:
 
 
 def read_camera(path: Path) -> CameraSetup:
-    """Read a camera.yaml: width height fx fy cx cy; optionally distortion (k1 k2 p1 p2 k3), depth_scale, readout.
+    """Read a camera.yaml: width height fx fy cx cy; optionally distortion (k1 k2 p1 p2 k3, or k4 k5 k6 as well),
+    depth_scale, readout.
 
     A negative fy is read as in ICL-NUIM: the images are upright all the same, so the camera gets its size, and
     ``y_up`` states that the poses are mirrored.
@@ -112,10 +113,9 @@ def _number(values: dict[str, Any], key: str, path: Path) -> float:
     return float(value)
 
 
-def _distortion(value: Any, path: Path) -> tuple[float, float, float, float, float]:
+def _distortion(value: Any, path: Path) -> tuple[float, ...]:
     if value is None:
         return NO_DISTORTION
-    if not isinstance(value, list) or len(value) != 5:
-        raise DatasetError(f"The camera file {path}: 'distortion' must list k1 k2 p1 p2 k3.")
-    k1, k2, p1, p2, k3 = (_number({"distortion": item}, "distortion", path) for item in value)
-    return k1, k2, p1, p2, k3
+    if not isinstance(value, list) or len(value) not in COEFFICIENTS:
+        raise DatasetError(f"The camera file {path}: 'distortion' must list k1 k2 p1 p2 k3, or k4 k5 k6 as well.")
+    return tuple(_number({"distortion": item}, "distortion", path) for item in value)

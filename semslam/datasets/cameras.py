@@ -9,10 +9,14 @@ import numpy as np
 
 from semslam.config import DatasetConfig
 from semslam.datasets.camera_file import CAMERA_FILE, CameraSetup, read_camera
+from semslam.datasets.images import image_size
+from semslam.errors import ConfigError, DatasetError
+from semslam.files import read_text
 from semslam.geometry.camera import Intrinsics
 from semslam.geometry.se3 import Transforms, make_transform, orthonormalise
 
 TUM_DEPTH_SCALE = 5000.0
+MILLIMETRES = 1000.0
 KINECT_READOUT = 0.026
 """Seconds that the colour camera of a Kinect or Xtion takes from its first row to its last; estimated on fr1/rpy."""
 LISTS = ("rgb.txt", "depth.txt", "groundtruth.txt", "accelerometer.txt")
@@ -158,6 +162,45 @@ def _comments(file: Path) -> str:
     return " ".join(line for line in lines if line.startswith("#"))
 
 
+def eth3d_camera(folder: Path) -> CameraSetup | None:
+    """The camera of an ETH3D SLAM sequence: fx fy cx cy in ``calibration.txt``, as large as its images.
+
+    The benchmark's cameras have a global shutter and no distortion is left in the images; depth has 5000 units per
+    metre (https://www.eth3d.net/slam_documentation). None where there is no such file.
+
+    Raises:
+        DatasetError: the first image is not readable.
+    """
+    file = folder / "calibration.txt"
+    images = sorted(folder.glob("rgb/*.png"))
+    if not file.is_file() or not images:
+        return None
+    words = read_text(file, "The calibration", DatasetError, COMMENT_BYTES).split()
+    try:
+        fx, fy, cx, cy = (float(word) for word in words)
+        return CameraSetup(Intrinsics(*image_size(images[0]), fx, fy, cx, cy, readout=0.0), TUM_DEPTH_SCALE)
+    except (ValueError, ConfigError) as error:
+        raise DatasetError(f"{file} does not hold the fx fy cx cy of a camera.") from error
+
+
+def layout_camera(folder: Path, config: DatasetConfig, stated: Callable[[], CameraSetup]) -> CameraSetup:
+    """The camera that the user or a camera.yaml in the folder gives, or else the one that the layout states itself.
+
+    Args:
+        folder: of the sequence.
+        config: the user's camera and depth scale.
+        stated: reads the layout's own camera; called only where it is needed.
+
+    Raises:
+        DatasetError: a camera file is not readable.
+    """
+    own = folder / CAMERA_FILE
+    setup = read_camera(config.camera or own) if config.camera or own.exists() else stated()
+    if config.depth_scale is None:
+        return setup
+    return replace(setup, depth_scale=config.depth_scale, scale_stated=True)
+
+
 def find_camera(folder: Path, config: DatasetConfig) -> CameraSetup | None:
     """The camera that the user, a camera.yaml in the folder or the known family gives, in that order.
 
@@ -174,11 +217,13 @@ def find_camera(folder: Path, config: DatasetConfig) -> CameraSetup | None:
         setup = read_camera(config.camera or own)
     elif known:
         setup = known.camera
+    elif calibrated := eth3d_camera(folder):
+        setup = calibrated
     else:
         return None
     if config.camera and known and known.camera.y_up:
         turned = read_camera(own).y_up if own.exists() else known.camera.y_up
         setup = replace(setup, y_up=setup.y_up or turned)
     stated = config.depth_scale or (setup.depth_scale if setup.scale_stated else None)
-    fallback = known.camera.depth_scale if known else None
+    fallback = (known.camera if known else setup).depth_scale
     return replace(setup, depth_scale=stated or fallback, scale_stated=stated is not None)

@@ -8,7 +8,7 @@ import numpy as np
 
 from semslam.datasets.images import DepthScale, read_color, read_depth
 from semslam.errors import DatasetError, printable
-from semslam.types import Float32Array, Frame, Intrinsics, Trajectory
+from semslam.types import Float32Array, Frame, Intrinsics, Trajectory, UInt8Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,11 +76,14 @@ class ImageSequence:
         if not 0 <= index < len(self):
             raise IndexError(f"Frame {index} of {len(self)}.")
         pair = self._pairs[index]
-        color = read_color(pair.color, (self.intrinsics.width, self.intrinsics.height))
+        color = self._read_color(pair.color)
         return Frame(index, pair.timestamp, color, self._read_depth(pair.depth), self.intrinsics, pair.number)
 
     def __iter__(self) -> Iterator[Frame]:
         return (self.frame(index) for index in range(len(self)))
+
+    def _read_color(self, path: Path) -> UInt8Array:
+        return read_color(path, (self.intrinsics.width, self.intrinsics.height))
 
     def _read_depth(self, path: Path) -> Float32Array:
         return read_depth(path, self._depth_scale, (self.intrinsics.width, self.intrinsics.height))

@@ -81,6 +81,16 @@ def decode_color(data: bytes, name: str, size: tuple[int, int] | None = None) ->
         raise DatasetError(f"{name} is damaged: {str(error).rstrip('.')}.") from error
 
 
+def image_size(path: Path) -> tuple[int, int]:
+    """Width and height of an image file by its header.
+
+    Raises:
+        DatasetError: the file is missing, cut off or no image.
+    """
+    header = read_header(_content(path), f"The image {path}")
+    return header.width, header.height
+
+
 def read_depth(
     path: Path, scale: DepthScale, size: tuple[int, int] | None = None, missing: int | None = None
 ) -> Float32Array:

@@ -11,7 +11,7 @@ from semslam.config import DatasetConfig
 from semslam.datasets import ros_topics
 from semslam.datasets.association import associate
 from semslam.datasets.camera_file import CameraSetup
-from semslam.datasets.cameras import find_camera
+from semslam.datasets.cameras import MILLIMETRES, find_camera
 from semslam.datasets.images import check_size
 from semslam.datasets.pairing import refuse_most
 from semslam.datasets.ros_messages import holds_floats, to_color, to_depth, to_intrinsics
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from rosbags.highlevel import AnyReader
     from rosbags.interfaces import Connection
 
-MILLIMETRES = 1000.0
 IMAGE, COMPRESSED, CAMERA_INFO = (f"sensor_msgs/msg/{name}" for name in ("Image", "CompressedImage", "CameraInfo"))
 
 

@@ -4,26 +4,21 @@ from dataclasses import replace
 from pathlib import Path
 from typing import ClassVar, Self
 
-import numpy as np
-
 from semslam.config import DatasetConfig
 from semslam.datasets.camera_file import CameraSetup
-from semslam.datasets.cameras import KINECT_READOUT, find_camera
+from semslam.datasets.cameras import KINECT_READOUT, MILLIMETRES, find_camera
+from semslam.datasets.frame_poses import frame_trajectory, read_pose
 from semslam.datasets.image_sequence import ImagePair, ImageSequence
 from semslam.datasets.images import read_depth
 from semslam.datasets.registration import register_depth
 from semslam.errors import DatasetError
-from semslam.files import read_text
 from semslam.geometry.camera import Intrinsics
-from semslam.geometry.se3 import FloatArray, invert, is_rigid, make_transform, orthonormalise
+from semslam.geometry.se3 import invert, make_transform
 from semslam.types import Float32Array, Trajectory
 
 COLOR_CAMERA = Intrinsics(640, 480, 525.0, 525.0, 320.0, 240.0, readout=KINECT_READOUT)
 DEPTH_CAMERA = Intrinsics(640, 480, 585.0, 585.0, 320.0, 240.0)
-MILLIMETRES = 1000.0
 NO_DEPTH = 65535
-RIGID_TOLERANCE = 0.01
-MAX_POSE_BYTES = 100_000
 
 T_COLOR_DEPTH = make_transform(
     [
@@ -72,7 +67,7 @@ class SevenScenesDataset(ImageSequence):
         stamps = [number / config.fps for number in numbers]
         depth = [file.with_name(file.name.replace(".color.", ".depth.")) for file in color]
         pairs = [ImagePair(*row) for row in zip(stamps, color, depth, numbers, strict=True)]
-        truth = _read_poses(stamps, color, config.register_depth, notes)
+        truth = _read_poses(pairs, config.register_depth, notes)
         name = f"{folder.resolve().parent.name}-{folder.resolve().name}"
         scale = replace(setup.depth(MILLIMETRES), assumed=False)  # the data set's own convention
         dataset = cls(name, setup.intrinsics, scale, pairs, truth, notes)
@@ -106,26 +101,8 @@ def _number(file: Path) -> int:
     return int(text)
 
 
-def _read_poses(stamps: list[float], color: list[Path], register: bool, notes: list[str]) -> Trajectory | None:
+def _read_poses(pairs: list[ImagePair], register: bool, notes: list[str]) -> Trajectory | None:
     """Poses of the colour camera; a file that is missing or damaged is counted, not fatal."""
-    poses, times = [], []
-    for stamp, file in zip(stamps, color, strict=True):
-        pose = _read_pose(file.with_name(file.name.replace(".color.png", ".pose.txt")))
-        if pose is not None:
-            poses.append(pose)
-            times.append(stamp)
-    if left := len(color) - len(poses):
-        notes.append(f"{left} of {len(color)} frames have no usable pose file.")
-    if not poses:
-        return None
-    T_world_cam = orthonormalise(np.stack(poses))
-    return Trajectory(np.array(times), T_world_cam @ invert(T_COLOR_DEPTH) if register else T_world_cam)
-
-
-def _read_pose(file: Path) -> FloatArray | None:
-    try:
-        words = read_text(file, "The pose", DatasetError, MAX_POSE_BYTES).split()
-        pose = np.array(words, dtype=np.float64).reshape(4, 4)
-    except (DatasetError, ValueError):
-        return None
-    return pose if is_rigid(pose, RIGID_TOLERANCE) else None
+    files = [pair.color.with_name(pair.color.name.replace(".color.png", ".pose.txt")) for pair in pairs]
+    truth = frame_trajectory(pairs, [read_pose(file) for file in files], notes)
+    return truth if truth is None or not register else Trajectory(truth.timestamps, truth.poses @ invert(T_COLOR_DEPTH))

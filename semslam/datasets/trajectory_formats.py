@@ -1,8 +1,9 @@
-"""Trajectory files of the three benchmarks whose formats everybody reads: TUM, KITTI, EuRoC.
+"""Trajectory files of the benchmarks whose formats everybody reads: TUM, KITTI, EuRoC, VSLAM-LAB.
 
 KITTI: twelve numbers a line, the upper 3 x 4 of T_world_cam, and no stamps; those stand in a file of their own
 (https://www.cvlibs.net/datasets/kitti/eval_odometry.php). EuRoC: comma-separated, nanoseconds, position, quaternion
 with its real part first, then columns that are no pose (Burri et al., The EuRoC micro aerial vehicle datasets, 2016).
+VSLAM-LAB: the same with the real part last, and a header (https://github.com/VSLAM-LAB/VSLAM-LAB).
 """
 
 import os
@@ -24,6 +25,7 @@ from semslam.geometry.se3 import (
 from semslam.types import Trajectory
 
 EUROC_HEADER = "#timestamp [ns], p_x [m], p_y [m], p_z [m], q_w [], q_x [], q_y [], q_z []"
+VSLAM_LAB_HEADER = "ts (ns),tx (m),ty (m),tz (m),qx,qy,qz,qw"
 KITTI_COLUMNS, EUROC_COLUMNS = 12, (8, 17)
 KITTI_TOLERANCE = 1e-3
 """How far the rotations of a KITTI file may be off: the benchmark's have seven digits."""
@@ -35,6 +37,7 @@ class TrajectoryFormat(StrEnum):
     TUM = "tum"
     KITTI = "kitti"
     EUROC = "euroc"
+    VSLAM_LAB = "vslam-lab"
 
 
 def recognise_format(path: Path) -> TrajectoryFormat:
@@ -46,6 +49,8 @@ def recognise_format(path: Path) -> TrajectoryFormat:
     lines = read_text(path, "The trajectory", TrajectoryError).splitlines()
     header = next((line for line in lines if line.strip()), "")
     row = next((line for line in lines if line.split("#", 1)[0].strip()), "")
+    if header.startswith("ts (ns)"):
+        return TrajectoryFormat.VSLAM_LAB
     if "," in row and (row.count(",") + 1 == max(EUROC_COLUMNS) or "q_w" in header or "q_RS_w" in header):
         return TrajectoryFormat.EUROC
     if "," not in row and len(row.split("#", 1)[0].split()) == KITTI_COLUMNS:
@@ -74,7 +79,9 @@ def read_poses(
     if form is TrajectoryFormat.KITTI:
         return _read_kitti(path, rate)
     if form is TrajectoryFormat.EUROC:
-        return _read_euroc(path), []
+        return _read_nanoseconds(path, "EuRoC", [5, 6, 7, 4]), []
+    if form is TrajectoryFormat.VSLAM_LAB:
+        return _read_nanoseconds(path, "VSLAM-LAB", [4, 5, 6, 7], header=True), []
     return read_trajectory(path)
 
 
@@ -90,10 +97,13 @@ def write_poses(path: Path, trajectory: Trajectory, form: TrajectoryFormat) -> N
         _write_rows(path, trajectory.poses[:, :3].reshape(-1, KITTI_COLUMNS), " ")
         _write_rows(times_file(path), trajectory.timestamps[:, None], " ")
     else:
-        quaternions = rotations_to_quaternions(trajectory.poses[:, :3, :3])[:, [3, 0, 1, 2]]
+        quaternions = rotations_to_quaternions(trajectory.poses[:, :3, :3])
+        header = VSLAM_LAB_HEADER
+        if form is TrajectoryFormat.EUROC:
+            quaternions, header = quaternions[:, [3, 0, 1, 2]], EUROC_HEADER
         columns = np.column_stack([trajectory.poses[:, :3, 3], quaternions])
         nanoseconds = [str(round(stamp * 1e9)) for stamp in trajectory.timestamps.tolist()]
-        _write_rows(path, columns, ",", EUROC_HEADER, nanoseconds)
+        _write_rows(path, columns, ",", header, nanoseconds)
 
 
 def times_file(path: Path) -> Path:
@@ -123,15 +133,16 @@ def _read_kitti(path: Path, rate: float | None) -> tuple[Trajectory, list[str]]:
     return _trajectory(path, np.arange(len(poses)) / rate, poses), [f"{path.name}: {rate:g} poses a second, as named."]
 
 
-def _read_euroc(path: Path) -> Trajectory:
-    rows = _table(path, ",")
+def _read_nanoseconds(path: Path, name: str, quaternion: list[int], header: bool = False) -> Trajectory:
+    """Rows of nanoseconds, position and a quaternion, whose real part stands in the last of the columns named."""
+    rows = _table(path, ",", header)
     if rows.shape[1] < min(EUROC_COLUMNS):
-        raise TrajectoryError(f"{path} is no EuRoC trajectory: its rows have {rows.shape[1]} columns.")
+        raise TrajectoryError(f"{path} is no {name} trajectory: its rows have {rows.shape[1]} columns.")
     norms = np.linalg.norm(rows[:, 4:8], axis=1)
     if (norms < 1e-6).any():
-        raise TrajectoryError(f"{path} is no EuRoC trajectory: a row has no rotation.")
+        raise TrajectoryError(f"{path} is no {name} trajectory: a row has no rotation.")
     poses = np.tile(np.eye(4), (len(rows), 1, 1))
-    poses[:, :3, :3] = quaternions_to_rotations(rows[:, [5, 6, 7, 4]])
+    poses[:, :3, :3] = quaternions_to_rotations(rows[:, quaternion])
     poses[:, :3, 3] = rows[:, 1:4]
     return _trajectory(path, rows[:, 0] / 1e9, poses)
 
@@ -144,9 +155,9 @@ def _trajectory(path: Path, stamps: FloatArray, poses: Transforms) -> Trajectory
     return Trajectory(stamps, poses)
 
 
-def _table(path: Path, separator: str) -> FloatArray:
+def _table(path: Path, separator: str, header: bool = False) -> FloatArray:
     text = read_text(path, "The trajectory", TrajectoryError)
-    lines = [line for line in text.splitlines() if line.split("#", 1)[0].strip()]
+    lines = [line for line in text.splitlines() if line.split("#", 1)[0].strip()][header:]
     if not lines:
         raise TrajectoryError(f"The trajectory {path} holds no poses.")
     try:

@@ -81,13 +81,20 @@ def _read_pairs(folder: Path, config: DatasetConfig, notes: list[str]) -> tuple[
 def _read_list(folder: Path, kind: str, notes: list[str], unit: str | None) -> ImageList:
     """The images of rgb.txt or depth.txt, or of the folder rgb/ or depth/ where the list is missing."""
     file = folder / f"{kind}.txt"
-    if not file.is_file():
-        return _list_folder(folder / kind, notes, unit)
+    return read_image_list(file, notes, unit) if file.is_file() else _list_folder(folder / kind, notes, unit)
+
+
+def read_image_list(file: Path, notes: list[str], unit: str | None) -> ImageList:
+    """A list of lines ``stamp file``; the files lie beside the list.
+
+    Raises:
+        DatasetError: a line is something else, or the unit of the stamps is not known.
+    """
     rows = [(number, line.split(maxsplit=1)) for number, line in _lines(file)]
     if short := next((number for number, row in rows if len(row) != 2), None):
         raise DatasetError(f"{file}, line {short}: expected 'timestamp filename'.")
     stamps = [_stamp(file, number, row[0]) for number, row in rows]
-    return in_order(file.name, stamps, [folder / row[1].strip() for _, row in rows], notes, unit)
+    return in_order(file.name, stamps, [file.parent / row[1].strip() for _, row in rows], notes, unit)
 
 
 def _list_folder(folder: Path, notes: list[str], unit: str | None) -> ImageList:

@@ -1,4 +1,4 @@
-"""The pinhole camera with Brown distortion: pixels to rays and back."""
+"""The pinhole camera with Brown or rational distortion: pixels to rays and back."""
 
 from dataclasses import dataclass
 from functools import lru_cache
@@ -14,6 +14,8 @@ from semslam.geometry.se3 import Float32Array, FloatArray
 PixelT = TypeVar("PixelT", np.uint8, np.uint16, np.float32)
 
 NO_DISTORTION = (0.0, 0.0, 0.0, 0.0, 0.0)
+COEFFICIENTS = (5, 8)
+"""Numbers of distortion coefficients: the Brown model's and the rational model's."""
 
 # Beyond these no camera lies; what is merely unusual is for ``semslam.datasets.plausibility`` to remark on.
 MAX_SIDE = 2**15
@@ -34,7 +36,8 @@ class Intrinsics:
         fy: focal length along v in pixels.
         cx: principal point, u in pixels.
         cy: principal point, v in pixels.
-        distortion: k1, k2, p1, p2, k3 of the Brown model (OpenCV's order).
+        distortion: k1, k2, p1, p2, k3 of the Brown model, or with k4, k5, k6 behind them of the rational model
+            (OpenCV's order).
         readout: seconds from the exposure of the first row to that of the last (rolling shutter); 0 = all rows at
             once, None = not known.
 
@@ -49,13 +52,14 @@ class Intrinsics:
     fy: float
     cx: float
     cy: float
-    distortion: tuple[float, float, float, float, float] = NO_DISTORTION
+    distortion: tuple[float, ...] = NO_DISTORTION
     readout: float | None = None
 
     def __post_init__(self) -> None:
         readout = 0.0 if self.readout is None else self.readout
         values = (self.width, self.height, self.fx, self.fy, self.cx, self.cy, readout, *self.distortion)
-        if len(self.distortion) != 5 or not all(isinstance(value, int | float | np.number) for value in values):
+        numeric = all(isinstance(value, int | float | np.number) for value in values)
+        if len(self.distortion) not in COEFFICIENTS or not numeric:
             raise ConfigError(f"These camera intrinsics are not usable: {self}.")
         numbers = (self.fx, self.fy, self.cx, self.cy, *self.distortion, readout)
         positive = min(self.width, self.height, self.fx, self.fy) > 0 and readout >= 0

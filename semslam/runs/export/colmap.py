@@ -3,49 +3,31 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from semslam.datasets.dataset import Dataset
 from semslam.geometry.camera import Intrinsics
 from semslam.geometry.se3 import invert, rotations_to_quaternions
-from semslam.runs.export.posed_images import PosedImage, write_posed_images
-from semslam.runs.results import SavedRun
-
-PIXEL_CENTRE = 0.5
-"""COLMAP's pixel (0, 0) is the corner of the first pixel, ours its centre."""
+from semslam.runs.export.posed_images import PosedImage, PosedModel
 
 
-def write_colmap(run: SavedRun, dataset: Dataset, directory: Path) -> int:
-    """Write ``images/`` and ``sparse/0/{cameras,images,points3D}.txt`` into a folder; no points.
-
-    Args:
-        run: the run; its keyframes of the largest map are written.
-        dataset: its sequence.
-        directory: an empty folder.
-
-    Returns:
-        How many images were written.
-
-    Raises:
-        ResultsError: the dataset is another sequence than the run's.
-        DatasetError: an image cannot be read.
-    """
-    images = write_posed_images(run, dataset, directory, depth=False)
+def _write(directory: Path, camera: Intrinsics, images: Sequence[PosedImage]) -> None:
+    """Write ``sparse/0/{cameras,images,points3D}.txt``; no points."""
     model = directory / "sparse" / "0"
     model.mkdir(parents=True)
-    (model / "cameras.txt").write_text(_camera(dataset.intrinsics), encoding="utf-8")
+    (model / "cameras.txt").write_text(_camera(camera), encoding="utf-8")
     (model / "images.txt").write_text(_images(images), encoding="utf-8")
     (model / "points3D.txt").write_text("# POINT3D_ID X Y Z R G B ERROR TRACK[]\n", encoding="utf-8")
-    return len(images)
 
 
 def _camera(camera: Intrinsics) -> str:
-    values = [camera.fx, camera.fy, camera.cx + PIXEL_CENTRE, camera.cy + PIXEL_CENTRE]
-    k1, k2, p1, p2, k3 = camera.distortion
-    if not any(camera.distortion):
+    """The simplest of COLMAP's models that has all the coefficients."""
+    values = [camera.fx, camera.fy, camera.cx, camera.cy]
+    k1, k2, p1, p2, *higher = camera.distortion
+    if not camera.is_distorted:
         model = "PINHOLE"
-    elif k3 == 0:
+    elif not any(higher):
         model, values = "OPENCV", [*values, k1, k2, p1, p2]
     else:
-        model, values = "FULL_OPENCV", [*values, k1, k2, p1, p2, k3, 0.0, 0.0, 0.0]
+        k3, k4, k5, k6 = higher if len(higher) == 4 else (*higher, 0.0, 0.0, 0.0)
+        model, values = "FULL_OPENCV", [*values, k1, k2, p1, p2, k3, k4, k5, k6]
     numbers = " ".join(map(repr, map(float, values)))
     return f"# CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]\n1 {model} {camera.width} {camera.height} {numbers}\n"
 
@@ -59,3 +41,6 @@ def _images(images: Sequence[PosedImage]) -> str:
         numbers = " ".join(map(repr, (w, x, y, z, *T_cam_world[:3, 3].tolist())))
         lines += [f"{number} {numbers} 1 {image.name}", ""]
     return "\n".join([*lines, ""])
+
+
+COLMAP = PosedModel(depth=False, rational=True, write=_write)

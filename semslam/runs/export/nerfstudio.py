@@ -1,37 +1,19 @@
 """A run's keyframes as nerfstudio's ``transforms.json`` (https://docs.nerf.studio/quickstart/data_conventions.html)."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
-from semslam.datasets.dataset import Dataset
-from semslam.runs.export.posed_images import DEPTH_SCALE, DEPTHS, IMAGES, write_posed_images
+from semslam.geometry.camera import Intrinsics
+from semslam.runs.export.posed_images import DEPTH_SCALE, DEPTHS, IMAGES, PosedImage, PosedModel
 from semslam.runs.files import write_json
-from semslam.runs.results import SavedRun
 
 FROM_OPENCV = np.diag([1.0, -1.0, -1.0, 1.0])
 """Its cameras look along -z with y up (OpenGL's), ours along z with y down."""
-PIXEL_CENTRE = 0.5
-"""Its pixel (0, 0) is the corner of the first pixel, ours its centre."""
 
 
-def write_nerfstudio(run: SavedRun, dataset: Dataset, directory: Path) -> int:
-    """Write ``images/``, ``depth/`` (millimetres) and ``transforms.json`` into a folder.
-
-    Args:
-        run: the run; its keyframes of the largest map are written.
-        dataset: its sequence.
-        directory: an empty folder.
-
-    Returns:
-        How many images were written.
-
-    Raises:
-        ResultsError: the dataset is another sequence than the run's.
-        DatasetError: an image cannot be read.
-    """
-    images = write_posed_images(run, dataset, directory, depth=True)
-    camera = dataset.intrinsics
+def _write(directory: Path, camera: Intrinsics, images: Sequence[PosedImage]) -> None:
     k1, k2, p1, p2, k3 = map(float, camera.distortion)
     write_json(
         directory / "transforms.json",
@@ -41,8 +23,8 @@ def write_nerfstudio(run: SavedRun, dataset: Dataset, directory: Path) -> int:
             "h": camera.height,
             "fl_x": float(camera.fx),
             "fl_y": float(camera.fy),
-            "cx": float(camera.cx) + PIXEL_CENTRE,
-            "cy": float(camera.cy) + PIXEL_CENTRE,
+            "cx": float(camera.cx),
+            "cy": float(camera.cy),
             "k1": k1,
             "k2": k2,
             "k3": k3,
@@ -59,4 +41,6 @@ def write_nerfstudio(run: SavedRun, dataset: Dataset, directory: Path) -> int:
             ],
         },
     )
-    return len(images)
+
+
+NERFSTUDIO = PosedModel(depth=True, rational=False, write=_write)

@@ -14,21 +14,12 @@ from semslam.datasets.camera_file import write_camera
 from semslam.datasets.sessions import SESSIONS, Session, SessionList
 from semslam.geometry.camera import Intrinsics
 from semslam.testing import DatasetContract
+from tests.semslam.datasets import samples
+from tests.semslam.datasets.samples import color_image, depth_image
 
 CAMERA = Intrinsics(64, 48, 60.0, 60.0, 31.5, 23.5)
-COUNT = 4
+COUNT = samples.COUNT
 POSE_ROW = "{stamp} {x} 0 0 0 0 0 1\n"
-
-
-def color_image(index: int, size: tuple[int, int] = (64, 48)) -> np.ndarray:
-    rng = np.random.default_rng(index)
-    return rng.integers(0, 255, (size[1], size[0], 3), dtype=np.uint8)
-
-
-def depth_image(index: int, size: tuple[int, int] = (64, 48)) -> np.ndarray:
-    depth = np.full((size[1], size[0]), 5000 + 100 * index, np.uint16)
-    depth[:5] = 0
-    return depth
 
 
 def write_images(color: Path, depth: Path, index: int, size: tuple[int, int] = (64, 48)) -> None:
@@ -117,6 +108,12 @@ def make_sessions(folder: Path) -> Path:
 
 MAKERS: dict[str, Callable[[Path], Path | str]] = {
     "tum": make_tum,
+    "vslam_lab": samples.make_vslam_lab,
+    "openloris": samples.make_openloris,
+    "replica": samples.make_replica,
+    "scannet": samples.make_scannet,
+    "tartanair": samples.make_tartanair,
+    "redwood": samples.make_redwood,
     "folder": make_folder,
     "seven_scenes": make_seven_scenes,
     "rosbag": make_rosbag,

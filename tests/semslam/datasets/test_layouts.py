@@ -71,7 +71,7 @@ def test_damaged_poses_are_counted(tmp_path: Path) -> None:
     (folder / "frame-000000.pose.txt").write_text("nan " * 16)
     (folder / "frame-000001.pose.txt").unlink()
     dataset = SevenScenesDataset.open(folder, CONFIG)
-    assert dataset.notes == ["2 of 3 frames have no usable pose file."]
+    assert dataset.notes == ["2 of 3 frames have no usable pose."]
     assert dataset.ground_truth is not None
     assert len(dataset.ground_truth) == 1
 

@@ -26,7 +26,7 @@ def test_a_path_that_the_system_refuses_is_one_sentence(tmp_path: Path) -> None:
 def test_a_path_that_is_no_sequence_says_what_was_looked_for(tmp_path: Path) -> None:
     (tmp_path / "notes.txt").write_text("hello")
     for path in (tmp_path, tmp_path / "notes.txt"):
-        with pytest.raises(DatasetError, match=r"is no sequence: looked for rgb\.txt") as caught:
+        with pytest.raises(DatasetError, match=r"is no sequence: looked for .*rgb\.txt") as caught:
             open_dataset(path)
         message = str(caught.value)
         assert all(word in message for word in ("frame-000000.color.png", "color/", ".bag"))
