@@ -62,7 +62,7 @@ def test_evos_own_commands_print_our_numbers(semslam: Call, saved: SavedRun, tmp
 
 
 def evo(command: str, *words: str) -> str:
-    program = [sys.executable, "-c", f"from evo.entry_points import {command}; {command}()"]
+    program = [sys.executable, "-c", f"from evo.cli import entry_points; entry_points.{command}()"]
     done = subprocess.run([*program, *words], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
