@@ -14,6 +14,7 @@ from semslam.errors import printable
 if TYPE_CHECKING:
     from semslam.eval.report.tables import Table as TextTable
     from semslam.runs.metrics import Latency, LoopMetrics, Metrics
+    from semslam.runs.profile import Profile
     from semslam.system.result import FrameState
 
 
@@ -120,6 +121,19 @@ def _realtime_rows(runs: Sequence["Metrics"]) -> list[tuple[str, list[str]]]:
 
 def _quantiles(latency: "Latency | None", digits: int) -> str:
     return "-" if latency is None else f"{latency.median:.{digits}f} / {latency.p99:.{digits}f}"
+
+
+def profile_table(profile: "Profile") -> Table:
+    """A row for each stage and thread."""
+    from semslam.runs.profile import stage_rows
+
+    table = _narrow(f"Where {profile.wall_s:.1f} s went")
+    for heading in ("where", "stage", "calls", "total, s", "of the run", "median, ms", "p95, ms", "worst, ms"):
+        table.add_column(heading, justify="left" if heading in ("where", "stage") else "right")
+    for row in stage_rows(profile):
+        times = (f"{value:.1f}" for value in (row.median_ms, row.p95_ms, row.worst_ms))
+        table.add_row(row.where, row.stage, str(row.calls), f"{row.total_s:.2f}", _percent(row.share), *times)
+    return table
 
 
 def comparison_table(runs: Sequence["Metrics"], title: str) -> Table:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from semslam.cli.console import complain, metrics_table, out, remark, remarks
+from semslam.cli.console import complain, metrics_table, out, profile_table, remark, remarks
 from semslam.cli.progress import bar
 from semslam.errors import ResultsError, SemslamError
 
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from semslam.runs.metrics import Metrics
     from semslam.runs.pipeline import RunResult
     from semslam.runs.place import RunPlace
+    from semslam.runs.profile import Profile
     from semslam.runs.recording import Recording
     from semslam.runtime.stopping import Stop
     from semslam.system.result import FrameState
@@ -31,7 +32,11 @@ NOT_TRACKED = 3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Task:
-    """What is to be run: with a recording from its motions, with a feed in real time."""
+    """What is to be run: with a recording from its motions, with a feed in real time.
+
+    Attributes:
+        profile: whether its account of time is written and printed.
+    """
 
     dataset: "Dataset"
     config: "Config"
@@ -42,14 +47,16 @@ class Task:
     recording: "Recording | None" = None
     viewer: "Viewer | None" = None
     feed: "Feed | None" = None
+    profile: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Done:
-    """What became of a run: its folder, its metrics, why it ended early and why it tracked next to nothing."""
+    """What became of a run: its folder, metrics and times, why it ended early and why it tracked next to nothing."""
 
     directory: Path
     metrics: "Metrics"
+    profile: "Profile"
     interrupted: bool
     failure: SemslamError | None
     shortfall: str | None
@@ -68,7 +75,7 @@ def carry_out(task: Task, place: "RunPlace", stop: "Stop", past: "JournalContent
         result, failure = error.result, error
     try:
         with place.results() as work:
-            fill(work, result, task.dataset, task.plots, task.source, task.command)
+            fill(work, result, task.dataset, task.plots, task.source, task.command, task.profile)
     except ResultsError as error:
         # Hours of tracking must not die with a full disk: show what was found, and keep the journal.
         out.print(metrics_table([result.metrics], task.dataset.name))
@@ -77,7 +84,7 @@ def carry_out(task: Task, place: "RunPlace", stop: "Stop", past: "JournalContent
         ) from error
     remarks(result.notes)
     reason = shortfall(result.metrics, result.slam.keyframes)
-    return Done(place.directory, result.metrics, result.metrics.interrupted, failure, reason)
+    return Done(place.directory, result.metrics, result.profile, result.metrics.interrupted, failure, reason)
 
 
 def _computed(task: Task, place: "RunPlace", stop: "Stop", past: "JournalContent | None") -> "RunResult":
@@ -109,6 +116,8 @@ def _computed(task: Task, place: "RunPlace", stop: "Stop", past: "JournalContent
 def show(done: Done, task: Task) -> None:
     """Print what a run found and where it is."""
     out.print(metrics_table([done.metrics], f"{task.dataset.name}: {done.metrics.frames} frames"))
+    if task.profile:
+        out.print(profile_table(done.profile))
     out.print(f"Results: {done.directory}", soft_wrap=True)
 
 

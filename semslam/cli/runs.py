@@ -26,6 +26,9 @@ Rate = Annotated[
     float | None,
     typer.Option("--rate", min=0.1, max=1000, help="With --realtime: frames per second, whatever their stamps."),
 ]
+WithProfile = Annotated[
+    bool, typer.Option("--profile", help="Print where the time went, and write profile.json and a picture of it.")
+]
 RerunFile = Annotated[Path | None, typer.Option("--rerun", help="Write a recording (.rrd) for the viewer.")]
 
 
@@ -50,6 +53,7 @@ def run_command(
     rerun_file: RerunFile = None,
     realtime: RealTime = False,
     rate: Rate = None,
+    profile: WithProfile = False,
     resume: Annotated[
         Path | None, typer.Option("--resume", help="A run folder whose run was killed: goes on with it.")
     ] = None,
@@ -79,6 +83,7 @@ def run_command(
                 stride > 1,
                 realtime,
                 rate,
+                profile,
             )
         ):
             raise ConfigError("--resume takes all settings from the run's journal; only the sequence may be named.")
@@ -109,7 +114,7 @@ def run_command(
         with reservation as place:
             viewer = _viewer(place.directory.name, rerun_file, visualize)
             feed = RealTimeFeed(dataset, rate) if realtime else None
-            task = Task(dataset, chosen, source, plots, sys.argv, saved_run, recording, viewer, feed)
+            task = Task(dataset, chosen, source, plots, sys.argv, saved_run, recording, viewer, feed, profile)
             done = carry_out(task, place, stop)
         if viewer is not None:
             viewer.close()

@@ -8,6 +8,7 @@ from threading import Condition
 from typing import Protocol
 
 from semslam.errors import DatasetError
+from semslam.runtime.stopwatch import Stopwatch
 from semslam.types import Frame
 
 WAITING = 4
@@ -34,9 +35,11 @@ class Feed(Protocol):
 
     Attributes:
         rate: frames per second where they do not come at their own stamps.
+        stopwatch: knows how long it took to read each.
     """
 
     rate: float | None
+    stopwatch: Stopwatch
 
     @property
     def dropped(self) -> tuple[int, ...]:

@@ -6,10 +6,11 @@ from concurrent.futures import Future, ThreadPoolExecutor
 
 from semslam.datasets.dataset import Dataset
 from semslam.errors import DatasetError
+from semslam.runtime.stopwatch import Stopwatch
 from semslam.types import Frame
 
 
-def prefetch(dataset: Dataset, ahead: int = 4) -> Iterator[Frame | DatasetError]:
+def prefetch(dataset: Dataset, ahead: int = 4, stopwatch: Stopwatch | None = None) -> Iterator[Frame | DatasetError]:
     """Read frames in order while the caller works on the one before.
 
     One thread reads, so the dataset need not be safe for several; decoding leaves the interpreter free. The
@@ -18,6 +19,7 @@ def prefetch(dataset: Dataset, ahead: int = 4) -> Iterator[Frame | DatasetError]
     Args:
         dataset: the sequence.
         ahead: maximum number of frames kept ready.
+        stopwatch: is shown how long reading takes.
 
     Yields:
         One item per frame, in order: the frame, or the error that stands in its place.
@@ -26,10 +28,11 @@ def prefetch(dataset: Dataset, ahead: int = 4) -> Iterator[Frame | DatasetError]
         Exception: whatever else the dataset raises, at the frame's place.
     """
     reader = ThreadPoolExecutor(max_workers=1, thread_name_prefix="semslam-reader")
+    watch = stopwatch or Stopwatch()
     pending: deque[Future[Frame | DatasetError]] = deque()
     try:
         for index in range(len(dataset)):
-            pending.append(reader.submit(read, dataset, index))
+            pending.append(reader.submit(read, dataset, index, watch))
             if len(pending) > ahead:
                 yield pending.popleft().result()
         while pending:
@@ -38,9 +41,10 @@ def prefetch(dataset: Dataset, ahead: int = 4) -> Iterator[Frame | DatasetError]
         reader.shutdown(wait=True, cancel_futures=True)
 
 
-def read(dataset: Dataset, index: int) -> Frame | DatasetError:
+def read(dataset: Dataset, index: int, stopwatch: Stopwatch) -> Frame | DatasetError:
     """A frame, or the error that stands in its place."""
     try:
-        return dataset.frame(index)
+        with stopwatch.stage("read"):
+            return dataset.frame(index)
     except DatasetError as error:
         return error

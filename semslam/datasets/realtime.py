@@ -7,6 +7,7 @@ from threading import Thread
 from semslam.datasets.dataset import Dataset
 from semslam.datasets.feed import Arrival, FrameQueue
 from semslam.datasets.prefetch import read
+from semslam.runtime.stopwatch import Stopwatch
 
 LATE = 0.1
 """Seconds after its time from which a frame is dropped unread, since reading it would only delay those after it."""
@@ -26,6 +27,7 @@ class RealTimeFeed:
     def __init__(self, dataset: Dataset, rate: float | None = None) -> None:
         self.rate = rate
         self._dataset = dataset
+        self.stopwatch = Stopwatch()
         self._queue = FrameQueue()
 
     @property
@@ -34,7 +36,7 @@ class RealTimeFeed:
         return self._queue.dropped
 
     def __iter__(self) -> Iterator[Arrival]:
-        first = read(self._dataset, 0)
+        first = read(self._dataset, 0, self.stopwatch)
         yield Arrival(0, first, time.perf_counter())
         reader = Thread(target=self._play, args=(time.perf_counter(),), name="semslam-reader", daemon=True)
         reader.start()
@@ -55,7 +57,7 @@ class RealTimeFeed:
                 if time.perf_counter() - due > LATE:
                     self._queue.drop(index)
                     continue
-                item = read(self._dataset, index)
+                item = read(self._dataset, index, self.stopwatch)
                 self._queue.wait_until(due)
                 self._queue.put(Arrival(index, item, due))
         except BaseException as reason:  # whatever a dataset raises is raised where the frame would have been taken

@@ -4,6 +4,7 @@ import time
 
 from semslam.runs.latency import Latencies
 from semslam.runs.metrics import TimeMetrics
+from semslam.runs.profile import Profile
 from semslam.runtime.stopwatch import Stopwatch
 from semslam.runtime.usage import ProcessUsage, usage_now
 
@@ -32,3 +33,7 @@ class RunClock:
             tracking_ms=latencies.tracking_ms,
             loop_s=latencies.loop_s,
         )
+
+    def profile(self, wall_s: float, stopwatch: Stopwatch, latencies: Latencies) -> Profile:
+        """Where the time of a run of so many seconds went."""
+        return Profile(self._start.process, self._wall, wall_s, stopwatch.spans, latencies.tracking, latencies.loops)

@@ -13,9 +13,9 @@ class Latencies:
 
     def __init__(self) -> None:
         self._begun = self._came = time.perf_counter()
-        self._tracking: list[float] = []
+        self._tracking: list[tuple[float, float]] = []
         self._lag: list[float] = []
-        self._loops: list[float] = []
+        self._loops: list[tuple[float, float]] = []
         self._keyframes: dict[int, float] = {}
 
     def begin(self, came: float | None = None) -> None:
@@ -34,32 +34,44 @@ class Latencies:
             keyframe: the keyframe that it has become, if any.
         """
         now = time.perf_counter()
-        self._tracking.append(now - self._begun)
+        self._tracking.append((self._begun, now - self._begun))
         self._lag.append(now - self._came)
         if keyframe is not None:
             self._keyframes[keyframe] = self._came
 
     def loop(self, keyframe: int) -> None:
         """A loop of a keyframe moves the poses from now on."""
-        self._loops.append(time.perf_counter() - self._keyframes.get(keyframe, self._came))
+        came = self._keyframes.get(keyframe, self._came)
+        self._loops.append((came, time.perf_counter() - came))
+
+    @property
+    def tracking(self) -> tuple[tuple[float, float], ...]:
+        """Start and length of each frame's tracking, in seconds."""
+        return tuple(self._tracking)
+
+    @property
+    def loops(self) -> tuple[tuple[float, float], ...]:
+        """Start and length of the time from a keyframe to the effect of its loops, in seconds."""
+        return tuple(self._loops)
 
     @property
     def tracking_ms(self) -> Latency | None:
         """Milliseconds that tracking took for a frame."""
-        return _latency(self._tracking, 1e3)
+        return latency([seconds for _, seconds in self._tracking], 1e3)
 
     @property
     def lag_ms(self) -> Latency | None:
         """Milliseconds from a frame's coming to its pose."""
-        return _latency(self._lag, 1e3)
+        return latency(self._lag, 1e3)
 
     @property
     def loop_s(self) -> Latency | None:
         """Seconds from a keyframe's coming to the effect of its loops."""
-        return _latency(self._loops, 1.0)
+        return latency([seconds for _, seconds in self._loops], 1.0)
 
 
-def _latency(seconds: Sequence[float], unit: float) -> Latency | None:
+def latency(seconds: Sequence[float], unit: float) -> Latency | None:
+    """Quantiles of times, in a unit of which a second has so many; None where there are none."""
     if not seconds:
         return None
     median, p95, p99, worst = np.round(unit * np.quantile(seconds, [0.5, 0.95, 0.99, 1.0]), 4).tolist()

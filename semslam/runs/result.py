@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from semslam.config import Config
 from semslam.errors import SemslamError
 from semslam.runs.metrics import Metrics
+from semslam.runs.profile import Profile
 from semslam.runs.recording import Recording
 from semslam.system.result import SlamResult
 from semslam.types import LedgerEntry, Trajectory
@@ -23,6 +24,7 @@ class RunResult:
         ground_truth: the dataset's, or None.
         ledger: one entry per loop candidate.
         metrics: all figures.
+        profile: where the time went.
         recording: what the front end made of the sequence, for a replay.
         notes: what was corrected or left out, a sentence each.
     """
@@ -35,6 +37,7 @@ class RunResult:
     ground_truth: Trajectory | None
     ledger: tuple[LedgerEntry, ...]
     metrics: Metrics
+    profile: Profile
     recording: Recording
     notes: tuple[str, ...]
 

@@ -19,6 +19,7 @@ from semslam.runs.manifest import METRICS, read_manifest, seal
 from semslam.runs.metrics import Metrics
 from semslam.runs.pipeline import RunResult
 from semslam.runs.place import reserved
+from semslam.runs.profile import write_profile
 from semslam.runs.recording import write_recording
 from semslam.types import Keyframe, LedgerEntry, Trajectory
 
@@ -82,6 +83,7 @@ def fill(
     plots: bool = True,
     source: str | None = None,
     command: Sequence[str] | None = None,
+    profile: bool = False,
 ) -> None:
     """Write all files of a run into an empty folder, the manifest and the metrics last; see ``write_run``."""
     (work / "config.yaml").write_text(result.config.dump(), encoding="utf-8")
@@ -98,6 +100,8 @@ def fill(
     write_map(work / "map.ply", result.slam.largest_map, result.slam.solution.poses)
     write_recording(work, result.recording, source)
     write_inliers(work, result.slam.outcomes, result.slam.keyframes)
+    if profile:
+        write_profile(work, result.profile)
     metrics = result.metrics.model_dump_json(indent=2) + "\n"
     seal(work, metrics, command)
     if plots:

@@ -83,10 +83,11 @@ class Session:
 
     def _frames(self) -> Iterator[tuple[int, Frame | DatasetError, float | None]]:
         """Each frame with its place and, where it comes by itself, the moment at which it came."""
-        if self._feed is None:
-            yield from ((index, item, None) for index, item in enumerate(prefetch(self._dataset)))
-        else:
+        if self._feed is not None:
             yield from ((arrival.index, arrival.item, arrival.at) for arrival in self._feed)
+        else:
+            for index, item in enumerate(prefetch(self._dataset, stopwatch=self._stopwatch)):
+                yield index, item, None
 
     def repeat(self, recording: Recording) -> Iterator[tuple[int, FrameState]]:
         """Take each frame's motion from a recording."""
@@ -175,11 +176,14 @@ class Session:
             raise as_our_own(error) from error
 
     def _joined(self, slam: SlamResult, error: str | None) -> RunResult:
+        if self._feed is not None:
+            self._stopwatch.add(self._feed.stopwatch.take())
         times = self._clock.read(len(slam.frames), self._stopwatch, self._latencies)
         unreadable = len(self._unreadable)
         lag = self._latencies.lag_ms
         realtime = None if self._feed is None or lag is None else measure_realtime(self._feed, slam, lag)
         scores = score_run(self._dataset, self._config, slam, unreadable, times, self._interrupted, error, realtime)
+        profile = self._clock.profile(times.wall_s, self._stopwatch, self._latencies)
         self._viewer.finish(partial(_shown_at_the_end, slam, scores, self._dataset.ground_truth))
         return RunResult(
             config=self._config,
@@ -190,6 +194,7 @@ class Session:
             ground_truth=self._dataset.ground_truth,
             ledger=scores.ledger,
             metrics=scores.metrics,
+            profile=profile,
             recording=Recording(
                 tuple(RecordedFrame(state.index, state.timestamp, state.motion) for state in slam.frames),
                 tuple(self._unreadable),

@@ -1,18 +1,44 @@
-"""How long each stage takes."""
+"""How long each stage takes, and which thread does it."""
 
+import os
+import threading
 import time
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from typing import NamedTuple
 
 import numpy as np
+
+
+class Span(NamedTuple):
+    """One call of a stage.
+
+    Attributes:
+        stage: its name.
+        start: seconds of ``time.perf_counter``, which all processes of a machine share.
+        seconds: how long it took.
+        process: the process that did it.
+        thread: the name of its thread.
+    """
+
+    stage: str
+    start: float
+    seconds: float
+    process: int
+    thread: str
 
 
 class Stopwatch:
     """Collects wall times by stage name; its values are reported and never decide anything."""
 
     def __init__(self) -> None:
-        self._seconds: defaultdict[str, list[float]] = defaultdict(list)
+        self._spans: list[Span] = []
+
+    @property
+    def spans(self) -> tuple[Span, ...]:
+        """All calls so far."""
+        return tuple(self._spans)
 
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:
@@ -21,18 +47,21 @@ class Stopwatch:
         try:
             yield
         finally:
-            self._seconds[name].append(time.perf_counter() - start)
+            seconds = time.perf_counter() - start
+            self._spans.append(Span(name, start, seconds, os.getpid(), threading.current_thread().name))
 
-    def take(self) -> dict[str, list[float]]:
-        """Hand out the times so far, by stage, and start anew."""
-        seconds, self._seconds = dict(self._seconds), defaultdict(list)
-        return seconds
+    def take(self) -> tuple[Span, ...]:
+        """Hand out the calls so far, and start anew."""
+        spans, self._spans = self._spans, []
+        return tuple(spans)
 
-    def add(self, seconds: Mapping[str, Sequence[float]]) -> None:
-        """Take in times that another stopwatch has handed out."""
-        for name, times in seconds.items():
-            self._seconds[name].extend(times)
+    def add(self, spans: Sequence[Span]) -> None:
+        """Take in calls that another stopwatch has handed out."""
+        self._spans.extend(spans)
 
     def medians_ms(self) -> dict[str, float]:
         """Median milliseconds of a call, by stage."""
-        return {name: round(1000.0 * float(np.median(times)), 3) for name, times in self._seconds.items()}
+        stages: defaultdict[str, list[float]] = defaultdict(list)
+        for span in self._spans:
+            stages[span.stage].append(span.seconds)
+        return {name: round(1000.0 * float(np.median(times)), 3) for name, times in stages.items()}

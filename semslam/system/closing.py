@@ -1,6 +1,6 @@
 """What happens at a keyframe besides tracking: loops are searched, and the live graph takes them in."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -10,7 +10,7 @@ from semslam.config import Config
 from semslam.loop.detector import NoLoops
 from semslam.loop.search import LoopSearch
 from semslam.loop.verification.verifier import LoopVerifier, build_verifier
-from semslam.runtime.stopwatch import Stopwatch
+from semslam.runtime.stopwatch import Span, Stopwatch
 from semslam.runtime.usage import ProcessUsage, usage_now
 from semslam.runtime.workers import Worker, WorkerKind, make_worker
 from semslam.system.shedding import SheddingVerifier
@@ -47,7 +47,7 @@ class KeyframeAnswer:
         accepted: match and query of the loops that the live graph follows from this keyframe on.
         withdrawn: the same of those that it no longer follows.
         labels: the keyframe's segmentation without confidences, where one was made.
-        seconds: time of each call, by stage.
+        spans: when each stage was done.
         usage: of the process in which loops are closed, so far.
     """
 
@@ -57,7 +57,7 @@ class KeyframeAnswer:
     accepted: tuple[tuple[int, int], ...]
     withdrawn: tuple[tuple[int, int], ...]
     labels: LabelMap | None
-    seconds: Mapping[str, Sequence[float]]
+    spans: tuple[Span, ...]
     usage: ProcessUsage
 
 
@@ -102,7 +102,7 @@ class LoopClosing:
             accepted=change.accepted,
             withdrawn=change.withdrawn,
             labels=None if self._search.labels is None else replace(self._search.labels, confidence=None),
-            seconds=self._stopwatch.take(),
+            spans=self._stopwatch.take(),
             usage=usage_now(),
         )
 
