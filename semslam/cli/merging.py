@@ -67,7 +67,8 @@ def merge_command(
         if out_directory is None:
             link_latest(options.RUNS, place_of_run.directory)
         task = Task(dataset, chosen, SESSIONS, plots, sys.argv, recording=merge.recording)
-        done = Done(place_of_run.directory, result.metrics, result.metrics.interrupted, failure, None)
+        metrics = result.metrics
+        done = Done(place_of_run.directory, metrics, result.profile, metrics.interrupted, failure, None)
         show(done, task)
         out.print(verdict, soft_wrap=True)
         end(done, task, stop)
