@@ -68,6 +68,25 @@ class ChangedSetting:
     default: str
 
 
+@dataclass(frozen=True, slots=True)
+class ObjectRow:
+    """An object of the semantic map, as it is printed: class, confidence, place and size in metres, keyframes."""
+
+    name: str
+    confidence: float
+    centroid: tuple[float, ...]
+    extent: tuple[float, ...]
+    keyframes: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class SemanticSection:
+    """The semantic map on a page: a picture as a data URI, or None, and the objects."""
+
+    picture: str | None
+    objects: tuple[ObjectRow, ...]
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class RunReport:
     """Everything on a run's page.
@@ -78,6 +97,7 @@ class RunReport:
         errors: rows of the error table; empty without ground truth.
         drawing: trajectories and all loop candidates.
         images: of the candidates' keyframes.
+        semantic: the semantic map, where one was made.
         inliers: (K, 4) pixels u, v in the query and u, v in the match, by position of the candidate.
         stages: where the time goes.
         resources: time and memory of the whole run.
@@ -92,6 +112,7 @@ class RunReport:
     errors: tuple[ErrorRow, ...]
     drawing: RunDrawing
     images: EmbeddedImages = NO_IMAGES
+    semantic: SemanticSection | None = None
     inliers: Mapping[int, FloatArray] = field(default_factory=dict)
     stages: tuple[StageTime, ...] = ()
     resources: tuple[Fact, ...] = ()

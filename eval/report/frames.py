@@ -123,8 +123,8 @@ def _embed(image: KeyframeImage) -> EmbeddedImage:
     mask = None
     if image.mask is not None:
         flat = _shrunk(image.mask, min(MASK_WIDTH, width), cv2.INTER_NEAREST)
-        mask = _uri("png", cv2.imencode(".png", flat[..., ::-1], [cv2.IMWRITE_PNG_COMPRESSION, 9])[1].tobytes())
-    return EmbeddedImage(width, height, _uri("jpeg", jpeg.tobytes()), mask, image.labels)
+        mask = data_uri("png", cv2.imencode(".png", flat[..., ::-1], [cv2.IMWRITE_PNG_COMPRESSION, 9])[1].tobytes())
+    return EmbeddedImage(width, height, data_uri("jpeg", jpeg.tobytes()), mask, image.labels)
 
 
 def _shrunk(image: UInt8Array, width: int, interpolation: int) -> UInt8Array:
@@ -132,5 +132,6 @@ def _shrunk(image: UInt8Array, width: int, interpolation: int) -> UInt8Array:
     return np.asarray(cv2.resize(image, (width, height), interpolation=interpolation), np.uint8)
 
 
-def _uri(kind: str, data: bytes) -> str:
+def data_uri(kind: str, data: bytes) -> str:
+    """An image file's content as a data URI, ``kind`` being its format."""
     return f"data:image/{kind};base64,{base64.b64encode(data).decode('ascii')}"

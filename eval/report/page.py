@@ -105,6 +105,7 @@ def _environment() -> Environment:
         lstrip_blocks=True,
     )
     environment.filters["percent"] = lambda share: f"{100 * share:+.1f} %"
+    environment.filters["metres"] = lambda values, between: between.join(f"{value:.2f}" for value in values)
     environment.policies["json.dumps_kwargs"] = {"separators": (",", ":"), "allow_nan": False}
     return environment
 

@@ -46,6 +46,8 @@ def map_command(
         seal_again(run)
     for path in written:
         out.print(f"Written: {path}", soft_wrap=True)
+    if semantic and out_directory is None:
+        out.print(f"semslam report {run} shows the semantic map on the run's page.", soft_wrap=True)
 
 
 def diff_command(
@@ -100,12 +102,13 @@ def view_command(
     sequence: Sequence = None,
 ) -> None:
     """Show a saved run in the viewer."""
-    from semslam.runs.playback import play
+    from semslam.runs.playback import has_semantic_map, play
     from semslam.runs.saved_views import open_saved
     from semslam.viewers.rerun_stream import open_viewer
 
     saved = open_saved(run, sequence)
-    viewer = open_viewer(run.resolve().name, file, live=file is None, finished=True)
+    semantic = has_semantic_map(run)
+    viewer = open_viewer(run.resolve().name, file, live=file is None, finished=True, semantic=semantic)
     with bar(f"{saved.dataset.name} view", len(saved.recording.frames)) as update:
         play(saved, viewer, update)
     viewer.close()

@@ -1,8 +1,10 @@
 """semslam compare, demo, bench."""
 
 import json
+import sys
 from collections.abc import Sequence
 from contextlib import AbstractContextManager, ExitStack, nullcontext
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -118,7 +120,7 @@ def bench_command(
     changes = {"detectors": names, "max_frames": max_frames}
     chosen = read_suite(suite, {name: value for name, value in changes.items() if value is not None})
     directory = out_directory or Path("bench") / chosen.name
-    plan = plan_jobs(chosen, options.settings(config, overrides), directory, data, plots)
+    plan = _signed(plan_jobs(chosen, options.settings(config, overrides), directory, data, plots))
     others = (*published_results(chosen), *external_results(_externals(external), chosen, plan))
     text = yaml.safe_dump(chosen.model_dump(mode="json"), sort_keys=False, allow_unicode=True)
     _claim(directory, text)
@@ -155,7 +157,7 @@ def _compare(
     from semslam.studies.sweep.engine import run_jobs
     from semslam.studies.sweep.plan import comparison_jobs
 
-    plan = comparison_jobs(source, name, config, detectors, directory, plots)
+    plan = _signed(comparison_jobs(source, name, config, detectors, directory, plots))
     with ExitStack() as places:  # what would keep one from being written is found out before the first run
         for job in plan:
             places.enter_context(reserved(job.directory))
@@ -183,6 +185,11 @@ def _compare(
         with writing(directory):
             present_comparison(directory)
     return metrics()
+
+
+def _signed(plan: "Sequence[Job]") -> "list[Job]":
+    """The jobs with this command line, which their runs' manifests keep."""
+    return [replace(job, command=tuple(sys.argv)) for job in plan]
 
 
 def _watched() -> "Crew":

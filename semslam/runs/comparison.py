@@ -11,6 +11,7 @@ from semslam.eval.report.page import ComparedRun, ComparisonReport, make_compari
 from semslam.eval.report.verdict import judge_comparison
 from semslam.eval.style import PLAIN, PictureSettings
 from semslam.runs.metrics import LoopMetrics, Metrics
+from semslam.runs.presentation import origin_of
 from semslam.runs.results import SavedRun, read_run
 
 FILE = "compare.json"
@@ -61,6 +62,7 @@ def comparison_report(runs: Sequence[SavedRun], directory: Path) -> ComparisonRe
         ),
         trajectories=tuple(_trajectories(runs)),
         truth=runs[0].ground_truth,
+        origin=origin_of(runs[0].directory),
     )
 
 

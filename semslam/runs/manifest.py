@@ -9,6 +9,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from semslam import __version__
 from semslam.errors import ResultsError
+from semslam.runs.checkout import commit
 from semslam.runs.files import sync
 
 MANIFEST, METRICS = "manifest.json", "metrics.json"
@@ -31,6 +32,7 @@ class Manifest(BaseModel):
     Attributes:
         kind: marks the folder as a run.
         version: of semslam.
+        commit: of the checkout it ran from, or None where it was installed.
         command: the command line, or None where a program called.
         files: by path below the folder; all but the manifest itself.
         checksum: SHA-256 of everything above.
@@ -40,13 +42,15 @@ class Manifest(BaseModel):
 
     kind: Literal["semslam run"] = "semslam run"
     version: str = __version__
+    commit: str | None = None
     command: tuple[str, ...] | None = None
     files: dict[str, FileRecord]
     checksum: str = ""
 
     def digest(self) -> str:
         """What ``checksum`` should be."""
-        return hashlib.sha256(self.model_dump_json(exclude={"checksum"}).encode()).hexdigest()
+        absent = {"checksum"} if self.commit else {"checksum", "commit"}  # earlier versions knew of no commit
+        return hashlib.sha256(self.model_dump_json(exclude=absent).encode()).hexdigest()
 
     def check(self, directory: Path, *names: str) -> None:
         """Make sure that files are as they were written.
@@ -97,11 +101,28 @@ def seal(directory: Path, metrics: str, command: Sequence[str] | None = None) ->
         metrics: the text of ``metrics.json``.
         command: the command line.
     """
+    origin = Manifest(commit=commit(), command=None if command is None else tuple(command), files={})
+    _seal(directory, metrics, origin)
+
+
+def seal_again(directory: Path) -> None:
+    """Take files into the manifest of a finished run that were added to it or written again.
+
+    Version, commit and command line stay those of the run.
+
+    Raises:
+        ResultsError: it is no run folder, or its manifest is damaged.
+    """
+    origin = read_manifest(directory)
+    _seal(directory, (directory / METRICS).read_text(encoding="utf-8"), origin)
+
+
+def _seal(directory: Path, metrics: str, origin: Manifest) -> None:
     last = {directory / MANIFEST, directory / METRICS}
     paths = [path for path in sorted(directory.rglob("*")) if not _is_folder(path) and path not in last]
     files = {str(path.relative_to(directory)): _record(path.read_bytes()) for path in paths}
     files[METRICS] = _record(metrics.encode())
-    manifest = Manifest(command=None if command is None else tuple(command), files=files)
+    manifest = origin.model_copy(update={"files": files})
     manifest = manifest.model_copy(update={"checksum": manifest.digest()})
     (directory / MANIFEST).write_text(manifest.model_dump_json(indent=2) + "\n", encoding="utf-8")
     for path in (*paths, directory / MANIFEST):
@@ -109,16 +130,6 @@ def seal(directory: Path, metrics: str, command: Sequence[str] | None = None) ->
     (directory / METRICS).write_text(metrics, encoding="utf-8")
     sync(directory / METRICS)
     sync(directory)
-
-
-def seal_again(directory: Path) -> None:
-    """Take files into the manifest of a finished run that were added to it or written again.
-
-    Raises:
-        ResultsError: it is no run folder, or its manifest is damaged.
-    """
-    command = read_manifest(directory).command
-    seal(directory, (directory / METRICS).read_text(encoding="utf-8"), command)
 
 
 def _read(directory: Path) -> Manifest:

@@ -8,6 +8,9 @@ from semslam.datasets.tum_format import read_trajectory
 from semslam.frontend.keyframes import KeyframeBuilder
 from semslam.loop.segmentation.build import build_segmenter
 from semslam.maps.cloud import join_clouds
+from semslam.maps.semantic.saved import LabelledMap, read_semantic_map
+from semslam.maps.semantic.semantic_map import JSON, PLY
+from semslam.runs.manifest import read_manifest
 from semslam.runs.recording import RecordedFrame
 from semslam.runs.saved_views import Progress, SavedViews, silent
 from semslam.system.result import FrameState
@@ -52,6 +55,18 @@ def play(saved: SavedViews, viewer: Viewer, progress: Progress = silent) -> None
     viewer.finish(lambda: _finished(saved, keyframes))
 
 
+def has_semantic_map(directory: Path) -> bool:
+    """Whether ``semslam map RUN --semantic`` has put one into a run folder."""
+    return {PLY, JSON} <= read_manifest(directory).files.keys()
+
+
+def _semantic_map(directory: Path) -> LabelledMap | None:
+    if not has_semantic_map(directory):
+        return None
+    read_manifest(directory).check(directory, PLY, JSON)
+    return read_semantic_map(directory)
+
+
 def _state(
     recorded: RecordedFrame, T_odom_cam: Transform, live: Mapping[float, Transform], keyframe: int | None
 ) -> FrameState:
@@ -77,4 +92,5 @@ def _finished(saved: SavedViews, keyframes: Sequence[Keyframe]) -> FinishedRun:
         keyframes=poses,
         ledger=saved.run.ledger,
         map=join_clouds([keyframe for keyframe in keyframes if keyframe.id in poses], poses),
+        semantic=_semantic_map(saved.run.directory),
     )

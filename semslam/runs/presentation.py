@@ -1,5 +1,6 @@
 """A saved run's pictures and its report page."""
 
+import shlex
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -17,8 +18,10 @@ from semslam.eval.report.verdict import Outcome, judge_run
 from semslam.eval.style import PLAIN, PictureSettings
 from semslam.runs.inliers import read_inliers
 from semslam.runs.keyframe_images import image_reader
+from semslam.runs.manifest import read_manifest
 from semslam.runs.metrics import Metrics
 from semslam.runs.results import SavedRun
+from semslam.runs.semantic_section import semantic_section
 
 
 def present(run: SavedRun, dataset: Dataset | None) -> None:
@@ -63,14 +66,24 @@ def run_report(run: SavedRun, dataset: Dataset | None) -> RunReport:
         errors=_errors(metrics),
         drawing=run_drawing(run),
         images=embed_images(run.ledger, image_reader(dataset, run.config)),
+        semantic=semantic_section(run.directory),
         inliers=read_inliers(run.directory),
         stages=tuple(StageTime(name, value) for name, value in metrics.time.stages_ms.items()),
         resources=_resources(metrics),
         changes=changed_settings(run.config),
-        origin=(Fact("page written by", f"semslam {__version__}"),),
+        origin=origin_of(run.directory),
         notes=run.notes,
         settings=run.config.dump(),
     )
+
+
+def origin_of(directory: Path) -> tuple[Fact, ...]:
+    """Version, commit and command line of a run, as far as it knows them."""
+    manifest = read_manifest(directory)
+    command = None if manifest.command is None else shlex.join(manifest.command)
+    known = (("version", f"semslam {manifest.version}"), ("commit", manifest.commit), ("command line", command))
+    facts = tuple(Fact(name, value) for name, value in known if value is not None)
+    return facts if manifest.version == __version__ else (*facts, Fact("page written by", f"semslam {__version__}"))
 
 
 def changed_settings(config: Config) -> tuple[ChangedSetting, ...]:

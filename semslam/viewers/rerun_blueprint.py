@@ -9,10 +9,17 @@ LIVE, FINAL, CAMERA, TRACKING = "world/live", "world/final", "world/live/camera"
 IMAGE = f"{CAMERA}/image"
 ADDED_UP = ("path", "odometry", "landmarks", "cloud", "nodes", "loops/verified", "loops/rejected")
 """What grows below ``world/live``: everything up to the moment shown is shown together."""
+SEMANTIC = ("semantic", "objects")
+"""What the semantic map adds below ``world/final``."""
 
 
-def make_blueprint(finished: bool) -> "Blueprint":
-    """The views and where they stand; of a run that is ``finished`` the final map comes first."""
+def make_blueprint(finished: bool, semantic: bool = False) -> "Blueprint":
+    """The views and where they stand.
+
+    Args:
+        finished: whether the run is over, so that the final map comes first.
+        semantic: whether there is a semantic map, which gets a view of its own.
+    """
     import rerun.blueprint as rrb
 
     until_now = rrb.VisibleTimeRanges(
@@ -24,7 +31,11 @@ def make_blueprint(finished: bool) -> "Blueprint":
         contents=[f"+ /{LIVE}/**", f"- /{IMAGE}/depth", f"- /{IMAGE}/labels"],
         overrides={f"/{LIVE}/{part}": until_now for part in ADDED_UP},
     )
-    final = rrb.Spatial3DView(name="Final", origin="world", contents=[f"+ /{FINAL}/**"])
+    contents = [f"+ /{FINAL}/**", *(f"- /{FINAL}/{part}" for part in SEMANTIC)]
+    views = [live, rrb.Spatial3DView(name="Final", origin="world", contents=contents)]
+    if semantic:
+        contents = [f"+ /{FINAL}/{part}" for part in (*SEMANTIC, "trajectory")]
+        views.append(rrb.Spatial3DView(name="Semantic", origin="world", contents=contents))
     images = rrb.Vertical(
         rrb.Spatial2DView(name="Colour and nodes", origin=IMAGE, contents=[f"+ /{IMAGE}/color", f"+ /{IMAGE}/nodes"]),
         rrb.Spatial2DView(name="Labels", origin=IMAGE, contents=[f"+ /{IMAGE}/labels"]),
@@ -32,7 +43,7 @@ def make_blueprint(finished: bool) -> "Blueprint":
     )
     return rrb.Blueprint(
         rrb.Vertical(
-            rrb.Horizontal(rrb.Tabs(live, final, active_tab=int(finished)), images, column_shares=[3, 1]),
+            rrb.Horizontal(rrb.Tabs(*views, active_tab=int(finished)), images, column_shares=[3, 1]),
             rrb.TimeSeriesView(name="Tracking", origin=TRACKING),
             row_shares=[5, 1],
         ),

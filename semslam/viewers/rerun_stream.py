@@ -9,7 +9,9 @@ from semslam.viewers.rerun_viewer import RerunViewer
 APPLICATION = "semslam"
 
 
-def open_viewer(name: str, file: Path | None, live: bool, finished: bool = False) -> RerunViewer:
+def open_viewer(
+    name: str, file: Path | None, live: bool, finished: bool = False, semantic: bool = False
+) -> RerunViewer:
     """Open a viewer.
 
     Args:
@@ -17,6 +19,7 @@ def open_viewer(name: str, file: Path | None, live: bool, finished: bool = False
         file: the .rrd file that is written, or None.
         live: whether to start the viewer and stream into it.
         finished: whether the run is over, so that its outcome is looked at first.
+        semantic: whether a semantic map will be shown.
 
     Raises:
         ConfigError: rerun-sdk is not installed.
@@ -35,7 +38,7 @@ def open_viewer(name: str, file: Path | None, live: bool, finished: bool = False
         if file is not None:
             file.parent.mkdir(parents=True, exist_ok=True)
             sinks.append(rr.FileSink(file))
-        stream.set_sinks(*sinks, default_blueprint=make_blueprint(finished))
+        stream.set_sinks(*sinks, default_blueprint=make_blueprint(finished, semantic))
     except (OSError, RuntimeError) as error:
         raise ResultsError(f"The viewer cannot be opened: {' '.join(str(error).split())}.") from error
     stream.send_recording_name(name)

@@ -7,10 +7,11 @@ import cv2
 import numpy as np
 
 from semslam.eval.style import ACCEPTED, ODOMETRY, OPTIMISED, OUTCOMES, REJECTED, TRUTH
-from semslam.geometry.se3 import transform_points
+from semslam.geometry.se3 import rotations_to_quaternions, transform_points
 from semslam.loop.detectors.semantic.nodes import extract_nodes
 from semslam.loop.detectors.semantic.settings import NodeConfig
 from semslam.loop.segmentation.classes import PALETTE
+from semslam.maps.semantic.saved import LabelledMap
 from semslam.system.result import FrameState
 from semslam.types import (
     Frame,
@@ -122,6 +123,8 @@ class RerunViewer:
         places = {key: T[:3, 3] for key, T in finished.keyframes.items()}
         self._final("keyframes", rr.Points3D(list(places.values()), colors=_rgb(OPTIMISED.color), radii=0.02))
         self._final("map", rr.Points3D(finished.map.points, colors=finished.map.colors, radii=rr.Radius.ui_points(1.5)))
+        if finished.semantic is not None:
+            self._show_semantic(finished.semantic)
         for outcome in LoopOutcome:
             self._final(f"loops/{outcome.value}", _lines(finished.ledger, outcome, places))
 
@@ -164,11 +167,7 @@ class RerunViewer:
     def _show_labels(self, labels: LabelMap, frame: Frame, T_world_cam: Transform) -> None:
         import rerun as rr
 
-        if self._names != labels.names:
-            self._names = labels.names
-            colors = PALETTE[np.arange(len(labels.names)) % len(PALETTE)]
-            classes = [(i, name, tuple(colors[i].tolist())) for i, name in enumerate(labels.names)]
-            self._stream.log("world", rr.AnnotationContext(classes), static=True)
+        self._name_classes(labels.names)
         self._stream.log(f"{IMAGE}/labels", rr.SegmentationImage(labels.labels))
         nodes = extract_nodes(labels, frame.depth, NodeConfig(min_area=MIN_NODE_AREA))
         self._stream.log(f"{IMAGE}/nodes", rr.Points2D(nodes.uvd[:, :2], class_ids=nodes.labels, radii=4))
@@ -179,6 +178,37 @@ class RerunViewer:
         points = transform_points(T_world_cam, np.column_stack([rays * z, z]))
         self._stream.log(
             f"{LIVE}/nodes", rr.Points3D(points, class_ids=nodes.labels[near], radii=0.03, show_labels=False)
+        )
+
+    def _name_classes(self, names: tuple[str, ...]) -> None:
+        import rerun as rr
+
+        if self._names != names:
+            self._names = names
+            colors = PALETTE[np.arange(len(names)) % len(PALETTE)]
+            classes = [(i, name, tuple(colors[i].tolist())) for i, name in enumerate(names)]
+            self._stream.log("world", rr.AnnotationContext(classes), static=True)
+
+    def _show_semantic(self, semantic: LabelledMap) -> None:
+        """Show points by class, and a box with its class around each object."""
+        import rerun as rr
+
+        self._name_classes(semantic.names)
+        points = rr.Points3D(
+            semantic.points, class_ids=semantic.labels, radii=rr.Radius.ui_points(2), show_labels=False
+        )
+        self._final("semantic", points)
+        boxes = semantic.objects
+        axes = np.array([box.axes for box in boxes]).reshape(-1, 3, 3)
+        self._final(
+            "objects",
+            rr.Boxes3D(
+                centers=[box.centre for box in boxes],
+                half_sizes=[box.half for box in boxes],
+                quaternions=[rr.Quaternion(xyzw=xyzw) for xyzw in rotations_to_quaternions(axes)],
+                class_ids=[box.label for box in boxes],
+                labels=[f"{box.name} {box.confidence:.2f}" for box in boxes],
+            ),
         )
 
     def _show_loops(self, loops: Sequence[ShownLoop]) -> None:

@@ -6,6 +6,7 @@ from typing import Protocol
 
 from semslam.errors import TrajectoryError
 from semslam.eval.trajectory import align
+from semslam.maps.semantic.saved import LabelledMap
 from semslam.system.result import FrameState
 from semslam.types import Cloud, Frame, Keyframe, LabelMap, LedgerEntry, Observations, Trajectory, Transform
 
@@ -59,6 +60,7 @@ class FinishedRun:
         keyframes: final poses (4, 4) by id, of the largest map.
         ledger: one entry per loop candidate.
         map: the map's points with colours.
+        semantic: the semantic map, where one was made.
     """
 
     trajectory: Trajectory
@@ -66,6 +68,7 @@ class FinishedRun:
     keyframes: Mapping[int, Transform]
     ledger: Sequence[LedgerEntry]
     map: Cloud
+    semantic: LabelledMap | None = None
 
 
 class Viewer(Protocol):

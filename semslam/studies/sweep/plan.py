@@ -46,6 +46,7 @@ class Job:
         recording: run folder whose front end is used again; None = track.
         plots: whether plots and a report are drawn.
         anew: whether it is made even where an earlier one is there.
+        command: the command line, for the run's manifest; None where a program called.
     """
 
     case: Case
@@ -55,6 +56,7 @@ class Job:
     recording: Path | None = None
     plots: bool = False
     anew: bool = False
+    command: tuple[str, ...] | None = None
 
     @property
     def front_end(self) -> str:

@@ -75,7 +75,7 @@ def _make(job: Job, progress: Progress) -> Outcome:
             result, failure = error.result, str(error)
         try:
             with place.results() as work:
-                fill(work, result, dataset, job.plots, job.source)
+                fill(work, result, dataset, job.plots, job.source, job.command)
         except ResultsError as error:
             return Outcome(job.case, result.metrics, str(error))
     if stop.requested or (result.metrics.interrupted and not failure):

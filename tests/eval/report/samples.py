@@ -1,10 +1,19 @@
 """A run and a comparison with something of everything, for tests of pictures and pages."""
 
+import cv2
 import numpy as np
 
-from semslam.eval.report.content import ChangedSetting, ErrorRow, Fact, RunReport, StageTime
+from semslam.eval.report.content import (
+    ChangedSetting,
+    ErrorRow,
+    Fact,
+    ObjectRow,
+    RunReport,
+    SemanticSection,
+    StageTime,
+)
 from semslam.eval.report.drawing import RunDrawing
-from semslam.eval.report.frames import KeyframeImage, LabelColor, embed_images
+from semslam.eval.report.frames import KeyframeImage, LabelColor, data_uri, embed_images
 from semslam.eval.report.overlay import NamedTrajectory
 from semslam.eval.report.page import ComparedRun, ComparisonReport
 from semslam.eval.report.verdict import Tone, Verdict
@@ -30,6 +39,10 @@ REPORT = RunReport(
     drawing=RUN,
     images=embed_images(
         ALL_KINDS, lambda frame: KeyframeImage(IMAGE, IMAGE // 64, (LabelColor("wall", "#ff0000", 0.5),))
+    ),
+    semantic=SemanticSection(
+        data_uri("png", cv2.imencode(".png", IMAGE)[1].tobytes()),
+        tuple(ObjectRow("refridgerator", 0.875, (1.0, -2.0, 0.5), (1.8, 0.6, 0.6), tuple(range(n))) for n in (40, 1)),
     ),
     inliers={0: np.array([[1.0, 2.0, 3.0, 4.0]])},
     stages=(StageTime("odometry", 12.34),),

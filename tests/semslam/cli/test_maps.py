@@ -10,6 +10,7 @@ import pytest
 
 from semslam.config import Config
 from semslam.datasets import open_dataset
+from semslam.maps.semantic.saved import read_semantic_map
 from semslam.runs.manifest import seal_again
 from semslam.runs.pipeline import run
 from semslam.runs.results import write_run
@@ -46,6 +47,31 @@ def test_the_maps_are_made_again_from_a_saved_run(semslam: Call, saved: Path, tm
     # The same surfaces, by other ways: nearly all points of one have one of the other beside them.
     for other in (sparse, o3d.geometry.PointCloud(mesh.vertices)):
         assert np.mean(np.asarray(other.compute_point_cloud_distance(cloud)) < 0.1) > 0.9
+
+
+def test_the_semantic_map_is_on_the_page_of_its_run_and_read_back(semslam: Call, saved: Path, tmp_path: Path) -> None:
+    directory = shutil.copytree(saved, tmp_path / "labelled")
+    assert semslam("report", directory).code == 0
+    assert "Semantic map" not in (directory / "report.html").read_text()
+    outcome = semslam("map", directory, "--semantic", "--voxel", 0.06)
+    assert outcome.code == 0, outcome.err
+    assert semslam("report", directory).code == 0
+    page = (directory / "report.html").read_text()
+    things = json.loads((directory / "objects.json").read_text())["objects"]
+    assert things
+    assert page.count('<details class="inline">') == len(things)
+    for thing in things:
+        assert f"<td>{thing['class']}</td>" in page
+    shown = read_semantic_map(directory)
+    assert len(shown.objects) == len(things)
+    for box, thing in zip(shown.objects, things, strict=True):
+        assert np.allclose(2 * box.half, thing["extent_m"], atol=1e-3)
+        assert np.linalg.det(box.axes) == pytest.approx(1.0, abs=1e-4)
+        assert (np.abs((np.array(thing["centroid_m"]) - box.centre) @ box.axes) <= box.half + 1e-3).all()
+    (directory / "objects.json").write_text("{}")
+    outcome = semslam("report", directory)
+    assert outcome.code == 2
+    assert "damaged" in outcome.err
 
 
 def test_a_map_needs_a_run_and_its_images(semslam: Call, saved: Path, tmp_path: Path) -> None:

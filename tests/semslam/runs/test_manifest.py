@@ -1,5 +1,6 @@
 """A run folder is known by its manifest, and no file of it can be damaged unnoticed."""
 
+import hashlib
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -8,7 +9,8 @@ import pytest
 
 from semslam.config import Config
 from semslam.errors import ResultsError
-from semslam.runs.manifest import read_manifest, seal
+from semslam.runs.checkout import commit
+from semslam.runs.manifest import Manifest, read_manifest, seal, seal_again
 from semslam.runs.pipeline import run
 from semslam.runs.recording import read_front_end
 from semslam.runs.results import READ, read_ledger, read_run, write_run
@@ -81,3 +83,22 @@ def test_the_manifest_names_version_command_and_all_files(tmp_path: Path) -> Non
     assert set(manifest.files) == {"plots/loops.png", "metrics.json"}
     assert manifest.command == ("semslam", "run", "room")
     assert manifest.version
+
+
+def test_a_run_knows_its_commit_and_keeps_its_origin_when_files_are_added(tmp_path: Path) -> None:
+    (tmp_path / "log.txt").write_text("")
+    seal(tmp_path, "{}", ("semslam", "run", "room"))
+    before = read_manifest(tmp_path)
+    assert before.commit == commit()
+    (tmp_path / "mesh.ply").write_text("mesh")
+    seal_again(tmp_path)
+    after = read_manifest(tmp_path)
+    assert "mesh.ply" in after.files
+    assert (after.version, after.commit, after.command) == (before.version, before.commit, before.command)
+
+
+def test_a_manifest_of_a_version_that_knew_of_no_commit_is_read() -> None:
+    plain = Manifest(files={})
+    text = f'{{"kind":"semslam run","version":"{plain.version}","command":null,"files":{{}}}}'
+    assert plain.digest() == hashlib.sha256(text.encode()).hexdigest()
+    assert plain.model_copy(update={"commit": "abc"}).digest() != plain.digest()

@@ -1,5 +1,6 @@
 """Runs shown in Rerun: the recording is read back."""
 
+import shutil
 import sys
 from collections import Counter
 from pathlib import Path
@@ -67,6 +68,15 @@ def test_a_saved_run_is_shown_again(semslam: Call, saved: Path, tmp_path: Path) 
     assert rows["/world/live/camera"] == 30
     assert 0 < rows["/world/live/camera/image/labels"] < 30
     assert rows["/world/final/map"] == 1
+
+
+def test_the_semantic_map_is_shown_where_there_is_one(semslam: Call, saved: Path, tmp_path: Path) -> None:
+    labelled = shutil.copytree(saved, tmp_path / "labelled")
+    assert semslam("map", labelled, "--semantic", "--voxel", 0.08).code == 0
+    outcome = semslam("view", labelled, "--save", tmp_path / "view.rrd")
+    assert outcome.code == 0, outcome.err
+    rows = _rows(tmp_path / "view.rrd")
+    assert rows["/world/final/semantic"] == rows["/world/final/objects"] == 1
 
 
 def test_the_final_trajectory_is_where_the_run_put_it(semslam: Call, saved: Path, tmp_path: Path) -> None:
