@@ -1,4 +1,5 @@
 # make demo: set up and run the demo.  make test: set up and run the tests.
+# make docs: build the site of the documentation into site/.
 # TORCH_INDEX names another wheel index for torch, such as PyTorch's own for CPU builds.
 # EXTRAS adds optional dependencies: make setup EXTRAS=test,rerun
 
@@ -8,7 +9,7 @@ BIN := $(VENV)/bin
 EXTRAS ?= test
 LIBS := libusb-1.0-0 libgl1 libegl1 libgomp1
 
-.PHONY: demo test check setup clean system-libraries
+.PHONY: demo test check docs setup clean system-libraries
 
 demo: setup
 	$(BIN)/semslam demo --out demo-run
@@ -22,6 +23,9 @@ check: setup
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
+docs: setup $(VENV)/.docs
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict
+
 setup: system-libraries $(VENV)/.ready
 
 $(VENV)/.ready: pyproject.toml constraints.txt
@@ -31,10 +35,14 @@ $(VENV)/.ready: pyproject.toml constraints.txt
 	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[$(EXTRAS)]'
 	touch $@
 
+$(VENV)/.docs: $(VENV)/.ready
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[docs]'
+	touch $@
+
 # Open3D's wheel loads these shared libraries; they are installed where the user may, and named where not.
 system-libraries:
 	@sh scripts/system-libraries.sh $(LIBS)
 
 clean:
-	rm -rf $(VENV) demo-run build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
+	rm -rf $(VENV) demo-run build dist site .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

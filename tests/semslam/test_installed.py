@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from scripts.markdown_links import links
+
 ROOT = Path(__file__).resolve().parents[2]
 SCRIPT = """\
 import semslam.testing
@@ -19,11 +21,12 @@ print(semslam.__file__)
 SIBLINGS = ("eval", "loop", "backend", "frontend")
 
 
-def build(source: Path, target: str, out: Path) -> Path:
+def build(source: Path, target: str, out: Path, repository: str = "") -> Path:
     """Build a wheel or an sdist from a source tree."""
     pytest.importorskip("hatchling")
     command = [sys.executable, "-m", "hatchling", "build", "-t", target, "-d", str(out)]
-    done = subprocess.run(command, cwd=source, capture_output=True, text=True, check=False)
+    environment = os.environ | {"SEMSLAM_REPOSITORY": repository}
+    done = subprocess.run(command, cwd=source, env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     return next(out.iterdir())
 
@@ -64,3 +67,16 @@ def test_types_weights_and_contracts_are_inside(site: Path) -> None:
     assert (package / "testing" / "odometry.py").is_file()
     assert list((package / "loop" / "segmentation" / "weights").glob("*.onnx"))
     assert not any((site / name).exists() for name in SIBLINGS)
+
+
+@pytest.mark.parametrize("repository", ["", "https://host.example/semslam"])
+def test_no_link_on_the_package_index_leads_nowhere(repository: str, tmp_path: Path) -> None:
+    with tarfile.open(build(ROOT, "sdist", tmp_path, repository)) as archive:
+        info = next(member for member in archive.getmembers() if member.name.endswith("/PKG-INFO"))
+        content = archive.extractfile(info)
+        assert content is not None
+        text = content.read().decode("utf-8")
+    assert "RGB-D SLAM whose loop closures come from semantics" in text
+    assert not [link.target for link in links(text) if link.is_relative]
+    assert (f"Project-URL: Repository, {repository}" in text) == bool(repository)
+    assert (f"]({repository}/blob/main/docs/tutorial.md)" in text) == bool(repository)
