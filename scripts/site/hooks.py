@@ -2,6 +2,7 @@
 
 import re
 from pathlib import Path
+from typing import Any
 
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
@@ -20,11 +21,23 @@ _origins: dict[str, str] = {}
 
 
 def on_config(config: MkDocsConfig) -> MkDocsConfig:
-    """List the commands' pages below the overview of the commands."""
-    for entry in config.nav or []:
-        if "Commands" in entry:
-            entry["Commands"] = ["commands.md", *({name: page} for page, name in COMMAND_PAGES.items())]
+    """List the pages of commands, detectors and experiments, and below Guides every other page of docs/."""
+    folders: dict[str, list[Any]] = {
+        "Commands": ["commands.md", *({name: page} for page, name in COMMAND_PAGES.items())],
+        "Detectors": ["detectors.md", *({page.stem: f"detectors/{page.name}"} for page in _written("detectors"))],
+        "Experiments": [f"experiments/{page.name}" for page in _written("experiments")],
+    }
+    navigation = [{title: folders.get(title, pages) for title, pages in entry.items()} for entry in config.nav or []]
+    listed = set(re.findall(r"[\w/-]+\.md", str(navigation)))
+    for entry in navigation:
+        entry.get("Guides", []).extend(page.name for page in _written(".") if page.name not in listed)
+    config.nav = navigation
     return config
+
+
+def _written(folder: str) -> list[Path]:
+    """The pages of a folder of docs/, by name."""
+    return sorted((ROOT / "docs" / folder).glob("*.md"))
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
