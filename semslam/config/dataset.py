@@ -18,7 +18,7 @@ class DatasetConfig(Section):
     time_unit: Literal["s", "ms", "us", "ns"] | None = setting(
         None, "unit of the time stamps in lists, file names and ground truth; none = recognised"
     )
-    register_depth: bool = setting(True, "7-Scenes: register raw depth to the colour camera")
+    register_depth: bool = setting(True, "7-Scenes, RealSense recordings: register raw depth to the colour camera")
     color_topic: str | None = setting(None, "ROS bag: topic of the colour images; none = chosen by role")
     depth_topic: str | None = setting(None, "ROS bag: topic of the depth images; none = chosen by role")
     camera_topic: str | None = setting(None, "ROS bag: topic of the CameraInfo; none = that of the colour images")

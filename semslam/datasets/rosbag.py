@@ -2,6 +2,7 @@
 
 import weakref
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
@@ -14,6 +15,8 @@ from semslam.datasets.camera_file import CameraSetup
 from semslam.datasets.cameras import MILLIMETRES, find_camera
 from semslam.datasets.images import check_size
 from semslam.datasets.pairing import refuse_most
+from semslam.datasets.realsense import unregistered_depth
+from semslam.datasets.registration import register_depth
 from semslam.datasets.ros_messages import holds_floats, to_color, to_depth, to_intrinsics
 from semslam.datasets.tum_format import read_trajectory
 from semslam.errors import DatasetError, printable
@@ -23,15 +26,20 @@ if TYPE_CHECKING:
     from rosbags.highlevel import AnyReader
     from rosbags.interfaces import Connection
 
+BEGINNINGS = {".bag": b"#ROSBAG V", ".mcap": b"\x89MCAP0\r\n"}
+"""First bytes of a bag by its suffix (http://wiki.ros.org/Bags/Format, https://mcap.dev/spec)."""
+MAGIC_BYTES = 16
 IMAGE, COMPRESSED, CAMERA_INFO = (f"sensor_msgs/msg/{name}" for name in ("Image", "CompressedImage", "CameraInfo"))
 
 
 class RosbagDataset:
-    """Colour and registered depth images of a bag (a .bag file, or a ROS 2 folder with metadata.yaml).
+    """Colour and depth images of a bag: a ROS 1 .bag, a ROS 2 folder with metadata.yaml, or a bare .mcap.
 
     The topics are chosen by the role and namespace in their names (``ros_topics``) unless set; what was chosen is
     noted. Stamps are the bag's recording times, which its index holds, so that a large bag opens at once. Depth is
-    32FC1 in metres or 16UC1 in millimetres (or as the settings or the camera file state). The camera is the one of
+    32FC1 in metres or 16UC1 in millimetres (or as the settings or the camera file state), and taken as registered to
+    colour, but for recordings of the RealSense viewer, whose depth is warped into the colour camera (``realsense``)
+    unless ``register_depth`` is off. The camera is the one of
     the settings, or the one known for the bag's name, or the CameraInfo of the colour images. Ground truth is a TUM
     file beside the bag named like it, ending in ``-groundtruth.txt``, as the TUM benchmark publishes them.
 
@@ -44,9 +52,10 @@ class RosbagDataset:
         TrajectoryError: the ground truth is there and not readable.
     """
 
-    layout: ClassVar[str] = "a .bag file, or metadata.yaml with .db3 or .mcap (ROS bag)"
+    layout: ClassVar[str] = "a .bag or .mcap file, or metadata.yaml with .db3 or .mcap (ROS bag)"
     reads: ClassVar[tuple[str, ...]] = (
-        "camera", "depth_scale", "association_window", "time_unit", "color_topic", "depth_topic", "camera_topic",
+        "camera", "depth_scale", "association_window", "time_unit", "register_depth", "color_topic",
+        "depth_topic", "camera_topic",
     )  # fmt: skip
 
     def __init__(self, path: Path, config: DatasetConfig) -> None:
@@ -59,9 +68,15 @@ class RosbagDataset:
         depths = ros_topics.choose_depth(images, self._color.topic)
         self._depth = _chosen(images, config.depth_topic, depths, "depth", path)
         notes = [f"Read from the topics {self._color.topic} and {self._depth.topic}."]
-        if not ros_topics.is_registered(self._depth.topic):
+        self._beside = unregistered_depth(self._color.topic, self._depth.topic, self._first)
+        if self._beside is not None and config.register_depth:
+            notes.append("Depth of a RealSense recording: it is registered to colour.")
+        elif not ros_topics.is_registered(self._depth.topic):
             notes.append(f"The name of {self._depth.topic} does not state that depth is registered to colour.")
         setup = self._find_camera(path, config, notes)
+        if self._beside is not None and setup.depth_scale is None:
+            setup = replace(setup, depth_scale=self._beside.units)
+        self._register = config.register_depth
         self.intrinsics, self._depth_scale = setup.intrinsics, setup.depth(MILLIMETRES)
         self._times_ns = self._pair(path, config, notes)
         self.timestamps = [color / 1e9 for color, _ in self._times_ns]
@@ -70,9 +85,10 @@ class RosbagDataset:
 
     @classmethod
     def recognises(cls, path: Path) -> bool:
-        """Whether the path is named like a bag."""
+        """Whether the path is a bag by its first bytes, or a folder of one."""
         if path.is_file():
-            return path.suffix == ".bag"
+            with path.open("rb") as stream:
+                return path.suffix in BEGINNINGS and stream.read(MAGIC_BYTES).startswith(BEGINNINGS[path.suffix])
         return (path / "metadata.yaml").is_file() and any((*path.glob("*.db3"), *path.glob("*.mcap")))
 
     @classmethod
@@ -104,7 +120,19 @@ class RosbagDataset:
         return (self.frame(index) for index in range(len(self)))
 
     def _read_depth(self, time_ns: int) -> Float32Array:
-        return to_depth(self._message(self._depth, time_ns), self._depth.topic, self._depth_scale)
+        depth = to_depth(self._message(self._depth, time_ns), self._depth.topic, self._depth_scale)
+        if self._beside is None or not self._register:
+            return depth
+        camera = self._beside.camera
+        check_size((depth.shape[1], depth.shape[0]), (camera.width, camera.height), f"An image of {self._depth.topic}")
+        return register_depth(depth, camera, self._beside.T_color_depth, self.intrinsics)
+
+    def _first(self, topic: str) -> Any:
+        """The first message of a topic, or None where there is none."""
+        connections = [connection for connection in self._reader.connections if connection.topic == topic]
+        if not connections or not len(times := _message_times(self._reader, connections[0])):
+            return None
+        return self._message(connections[0], int(times[0]))
 
     def _message(self, connection: "Connection", time_ns: int) -> Any:
         try:

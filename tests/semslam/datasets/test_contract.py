@@ -15,6 +15,7 @@ from semslam.datasets.sessions import SESSIONS, Session, SessionList
 from semslam.geometry.camera import Intrinsics
 from semslam.testing import DatasetContract
 from tests.semslam.datasets import samples
+from tests.semslam.datasets.bags import BagWriter
 from tests.semslam.datasets.samples import color_image, depth_image
 
 CAMERA = Intrinsics(64, 48, 60.0, 60.0, 31.5, 23.5)
@@ -60,44 +61,16 @@ def make_seven_scenes(folder: Path) -> Path:
 
 
 def make_rosbag(folder: Path) -> Path:
-    writing = pytest.importorskip("rosbags.rosbag1", reason="the extra 'ros' is not installed")
-    from rosbags.typesys import Stores, get_typestore
-
-    store = get_typestore(Stores.ROS1_NOETIC)
-    types = store.types
-    header, image_type, info_type = (
-        types[name] for name in ("std_msgs/msg/Header", "sensor_msgs/msg/Image", "sensor_msgs/msg/CameraInfo")
-    )
-    region = types["sensor_msgs/msg/RegionOfInterest"]
-    with writing.Writer(folder / "some.bag") as bag:
-        topics = {
-            name: bag.add_connection(f"/camera/{name}", kind.__msgtype__, typestore=store)
-            for name, kind in (
-                ("rgb/image_color", image_type), ("depth/image", image_type), ("rgb/camera_info", info_type)
-            )
-        }  # fmt: skip
-
-        def write(topic: str, nanoseconds: int, message: object) -> None:
-            connection = topics[topic]
-            bag.write(connection, nanoseconds, store.serialize_ros1(message, connection.msgtype))
-
-        for i in range(COUNT):
-            now = 10**18 + i * 33_000_000
-            stamp = types["builtin_interfaces/msg/Time"](sec=now // 10**9, nanosec=now % 10**9)
-            head = header(seq=i, stamp=stamp, frame_id="camera")
-            color = color_image(i)
-            depth = depth_image(i).astype(np.float32) / 5000
-            depth[:5] = np.nan
-            no_region = region(x_offset=0, y_offset=0, height=0, width=0, do_rectify=False)
-            write("rgb/image_color", now, image_type(head, 48, 64, "rgb8", 0, 192, color.ravel()))
-            write(
-                "depth/image", now + 2_000_000, image_type(head, 48, 64, "32FC1", 0, 256, depth.view(np.uint8).ravel())
-            )
-            K, P = CAMERA.matrix.ravel(), np.zeros(12)
-            info = info_type(head, 48, 64, "plumb_bob", np.zeros(5), K, np.eye(3).ravel(), P, 0, 0, no_region)
-            write("rgb/camera_info", now, info)
+    writer = BagWriter("bag")
+    for i in range(COUNT):
+        now = 10**18 + i * 33_000_000
+        depth = depth_image(i).astype(np.float32) / 5000
+        depth[:5] = np.nan
+        writer.add_image("/camera/rgb/image_color", now, "rgb8", color_image(i))
+        writer.add_image("/camera/depth/image", now + 2_000_000, "32FC1", depth)
+        writer.add_camera("/camera/rgb/camera_info", now, CAMERA)
     (folder / "some-groundtruth.txt").write_text(POSE_ROW.format(stamp=10**9, x=0))
-    return folder / "some.bag"
+    return writer.write(folder)
 
 
 def make_sessions(folder: Path) -> Path:
