@@ -27,6 +27,7 @@ class ErrorRow:
         odometry: of the front end's own trajectory.
         pose_graph: after the pose graph with its loops, before the last adjustment.
         optimised: of the final trajectory.
+        comparable: whether odometry's own trajectory has about the same frames as the others.
     """
 
     name: str
@@ -34,11 +35,12 @@ class ErrorRow:
     odometry: float | None
     pose_graph: float | None
     optimised: float | None
+    comparable: bool = True
 
     @property
     def by_loops(self) -> float | None:
         """Relative change by the pose graph."""
-        return _change(self.odometry, self.pose_graph)
+        return _change(self.odometry, self.pose_graph) if self.comparable else None
 
     @property
     def by_adjustment(self) -> float | None:
@@ -48,7 +50,7 @@ class ErrorRow:
     @property
     def in_all(self) -> float | None:
         """Relative change from the odometry to the final trajectory."""
-        return _change(self.odometry, self.optimised)
+        return _change(self.odometry, self.optimised) if self.comparable else None
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,6 +10,8 @@ from semslam.types import LedgerEntry, LoopOutcome
 NOTICEABLE = 0.01
 """Errors that differ by less than this share are called equal."""
 FEW_TRACKED = 0.95
+SAME_FRAMES = 0.95
+"""Share of the final poses that odometry's own trajectory must have for their errors to be compared."""
 
 
 class Tone(StrEnum):
@@ -37,12 +39,14 @@ class Outcome:
         pose_graph: after the pose graph, before the adjustment.
         optimised: of the final trajectory.
         tracked: share of frames, 0..1.
+        covered: share of the final trajectory's poses that odometry's own has; it is less where loops joined maps.
     """
 
     odometry: float | None
     pose_graph: float | None
     optimised: float | None
     tracked: float
+    covered: float = 1.0
 
 
 def judge_run(outcome: Outcome, loops: Sequence[LedgerEntry]) -> Verdict:
@@ -85,6 +89,9 @@ def _error_clause(outcome: Outcome) -> tuple[str, bool | None]:
     before, after = outcome.odometry, outcome.optimised
     if before is None or after is None:
         return "without ground truth no error is known", None
+    if outcome.covered < SAME_FRAMES:
+        share = f"{100 * outcome.covered:.0f} %"
+        return f"the position error (ATE) is {_cm(after)}; odometry alone has {_cm(before)} on {share} of it", None
     if abs(after - before) <= NOTICEABLE * before:
         return f"the position error (ATE) stays at {_cm(after)}", None
     verb = "falls" if after < before else "rises"

@@ -25,7 +25,7 @@ from semslam.types import Motion, TrackingStatus, Trajectory
 
 DETECTOR = "fused"
 """Proposes loops where the first run had no detector."""
-BREAK = 10.0
+BREAK = 2.0
 """Times ``loops.min_gap``: seconds between the sessions, enough for loops between their ends."""
 
 

@@ -14,7 +14,7 @@ from semslam.eval.report.drawing import RunDrawing
 from semslam.eval.report.frames import embed_images
 from semslam.eval.report.page import make_report
 from semslam.eval.report.plots import draw_run
-from semslam.eval.report.verdict import Outcome, judge_run
+from semslam.eval.report.verdict import SAME_FRAMES, Outcome, judge_run
 from semslam.eval.style import PLAIN, PictureSettings
 from semslam.runs.inliers import read_inliers
 from semslam.runs.keyframe_images import image_reader
@@ -111,7 +111,13 @@ def _outcome(metrics: Metrics) -> Outcome:
         pose_graph=metrics.pose_graph.ate_rmse_m,
         optimised=metrics.optimized.ate_rmse_m,
         tracked=metrics.tracked / max(metrics.frames, 1),
+        covered=_covered(metrics),
     )
+
+
+def _covered(metrics: Metrics) -> float:
+    """Share of the scored final poses that odometry's own trajectory has; all of them where nothing is scored."""
+    return (metrics.odometry_only.pairs or 0) / metrics.optimized.pairs if metrics.optimized.pairs else 1.0
 
 
 def _facts(metrics: Metrics) -> tuple[Fact, ...]:
@@ -144,9 +150,17 @@ def _resources(metrics: Metrics) -> tuple[Fact, ...]:
 def _errors(metrics: Metrics) -> tuple[ErrorRow, ...]:
     if metrics.optimized.ate_rmse_m is None:
         return ()
-    stages = (metrics.odometry_only, metrics.pose_graph, metrics.optimized)
+    comparable = _covered(metrics) >= SAME_FRAMES
     return tuple(
-        ErrorRow(error.title, error.unit, *(getattr(stage, name) for stage in stages)) for name, error in ERRORS.items()
+        ErrorRow(
+            name=error.title,
+            unit=error.unit,
+            odometry=getattr(metrics.odometry_only, name),
+            pose_graph=getattr(metrics.pose_graph, name),
+            optimised=getattr(metrics.optimized, name),
+            comparable=comparable,
+        )
+        for name, error in ERRORS.items()
     )
 
 

@@ -97,6 +97,20 @@ def test_settings_stages_notes_and_origin_are_shown() -> None:
     assert "All settings are at their defaults" in make_report(replace(REPORT, changes=()))
 
 
+def test_errors_of_different_frames_are_not_compared() -> None:
+    row = ErrorRow("ATE", "m", 0.4, 0.08, 0.04, comparable=False)
+    assert (row.by_loops, row.in_all, row.by_adjustment) == (None, None, -0.5)
+    assert "no change is stated" in make_report(replace(REPORT, errors=(row,)))
+    assert "no change is stated" not in make_report(REPORT)
+
+
+def test_the_objects_of_the_semantic_map_are_listed() -> None:
+    page = make_report(REPORT)
+    assert page.count("<td>refridgerator</td>") == 2
+    assert "1.80 × 0.60 × 0.60" in page
+    assert "Semantic map" not in make_report(replace(REPORT, semantic=None))
+
+
 def test_without_truth_and_without_loops() -> None:
     page = make_report(replace(REPORT, drawing=replace(RUN, truth=None, loops=()), errors=()))
     assert "There is no ground truth" in page

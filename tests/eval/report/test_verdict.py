@@ -17,6 +17,7 @@ TRUE, FALSE = judged(LoopJudgement.TRUE), judged(LoopJudgement.FALSE)
         (Outcome(0.04, None, 0.08, 1.0), [], Tone.BAD, "rises from 4.00 cm to 8.00 cm, without loops"),
         (Outcome(0.04, None, 0.0401, 1.0), [REJECTED], Tone.PLAIN, "stays at 4.01 cm, with 0 of 1 proposed"),
         (Outcome(None, None, None, 1.0), [ACCEPTED], Tone.PLAIN, "Without ground truth no error is known, with 1 of 1"),
+        (Outcome(0.30, 0.05, 0.04, 1.0, 0.5), [TRUE], Tone.PLAIN, "is 4.00 cm; odometry alone has 30.00 cm on 50 %"),
         (Outcome(0.30, 0.05, 0.04, 0.5), [TRUE], Tone.BAD, "Only 50 % of the frames were tracked, the position"),
     ],
 )
