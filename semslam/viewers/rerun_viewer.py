@@ -1,7 +1,6 @@
 """A run shown in Rerun (https://rerun.io)."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any, cast
 
 import cv2
@@ -35,10 +34,8 @@ FRUSTUM = 0.25
 """Metres from the camera's centre at which its image is drawn."""
 WAITING = 64
 """Keyframes whose images are kept until their labels come; without a loop detector none come."""
-MIN_NODE_AREA = 0.002
-"""Share of the image; smaller blocks are not shown as nodes."""
-NODE_WIDTH = 160
-"""Pixels of the label image in which nodes are looked for; in a whole one it takes longer than all other drawing."""
+NODES = NodeConfig(min_area=0.002, cluster_radius=0.0)
+"""Blocks that are shown as nodes; merging dense ones takes longer than everything else that is shown."""
 
 
 class RerunViewer:
@@ -172,15 +169,12 @@ class RerunViewer:
 
         self._name_classes(labels.names)
         self._stream.log(f"{IMAGE}/labels", rr.SegmentationImage(labels.labels))
-        step = max(labels.labels.shape[1] // NODE_WIDTH, 1)
-        thinned = replace(labels, labels=labels.labels[::step, ::step])
-        nodes = extract_nodes(thinned, frame.depth[::step, ::step], NodeConfig(min_area=MIN_NODE_AREA))
-        pixels = step * nodes.uvd[:, :2]
-        self._stream.log(f"{IMAGE}/nodes", rr.Points2D(pixels, class_ids=nodes.labels, radii=4))
+        nodes = extract_nodes(labels, frame.depth, NODES)
+        self._stream.log(f"{IMAGE}/nodes", rr.Points2D(nodes.uvd[:, :2], class_ids=nodes.labels, radii=4))
         near = nodes.uvd[:, 2] > 0
         z = nodes.uvd[near, 2:]
         camera = frame.intrinsics
-        rays = (camera.undistort_pixels(pixels[near]) - (camera.cx, camera.cy)) / (camera.fx, camera.fy)
+        rays = (camera.undistort_pixels(nodes.uvd[near, :2]) - (camera.cx, camera.cy)) / (camera.fx, camera.fy)
         points = transform_points(T_world_cam, np.column_stack([rays * z, z]))
         self._stream.log(
             f"{LIVE}/nodes", rr.Points3D(points, class_ids=nodes.labels[near], radii=0.03, show_labels=False)
