@@ -1,7 +1,7 @@
 """Following a loop: after a verified loop, odometry predicts which earlier keyframes the next ones overlap."""
 
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
@@ -35,6 +35,7 @@ class LoopFollower:
         self._config = config
         self._poses: list[Transform] = []
         self._frames: list[int] = []  # which keyframe's map each pose is in: poses of different maps do not compare
+        self._forgotten: set[int] = set()
         self._tried: set[int] = set()
         self._waiting: deque[LoopCandidate] | None = None
         self._verified = 0
@@ -50,6 +51,10 @@ class LoopFollower:
             self._poses.append(self._poses[-1] @ invert(before.T_odom_cam) @ keyframe.T_odom_cam)
             self._frames.append(self._frames[-1])
         self._tried, self._verified, self._waiting = set(), 0, None
+
+    def forget(self, ids: Collection[int]) -> None:
+        """Propose these keyframes no more."""
+        self._forgotten.update(ids)
 
     def note(self, outcome: Verification) -> None:
         """Take into account what became of a candidate of the newest keyframe, whoever proposed it."""
@@ -97,7 +102,9 @@ class LoopFollower:
         old = [
             k
             for k in keyframes[:-1]
-            if query.timestamp - k.timestamp >= gap and self._frames[k.id] == self._frames[query.id]
+            if query.timestamp - k.timestamp >= gap
+            and self._frames[k.id] == self._frames[query.id]
+            and k.id not in self._forgotten
         ]
         shares = np.zeros(len(keyframes))
         if not old or not len(points):

@@ -1,10 +1,13 @@
 """Everything about loops that happens at a keyframe: label, propose, verify, follow (paper, section 3)."""
 
+from collections.abc import Collection
 from typing import Self
 
 from semslam.config import Config, LoopConfig
-from semslam.loop.detector import LoopDetector
+from semslam.errors import ConfigError
+from semslam.loop.detector import LoopDetector, Remembering
 from semslam.loop.following import LoopFollower
+from semslam.loop.memory import LoopMemory, without_content
 from semslam.loop.segmentation.build import build_segmenter
 from semslam.loop.segmentation.segmenter import Segmenter
 from semslam.loop.verification.verifier import LoopVerifier, build_verifier
@@ -38,6 +41,7 @@ class LoopSearch:
         self._follower = LoopFollower(config)
         self._stopwatch = stopwatch or Stopwatch()
         self._keyframes: list[Keyframe] = []
+        self._forgotten: set[int] = set()
         self._labels: LabelMap | None = None
 
     @classmethod
@@ -61,7 +65,7 @@ class LoopSearch:
 
     @property
     def keyframes(self) -> tuple[Keyframe, ...]:
-        """All keyframes so far; ``keyframes[i].id`` is i."""
+        """All keyframes so far; ``keyframes[i].id`` is i. Forgotten ones are without content."""
         return tuple(self._keyframes)
 
     @property
@@ -80,11 +84,8 @@ class LoopSearch:
         Returns:
             What the verification made of each candidate, in the order in which they were verified.
         """
-        if labels is None and self._segmenter is not None:
-            with self._stopwatch.stage("segmentation"):
-                labels = self._segmenter.segment(frame.color, frame.source_index)
-        self._labels = labels
-        view = KeyframeView(keyframe, frame.color, frame.depth, labels)
+        view = self._view(keyframe, frame, labels)
+        self._labels = view.labels
         with self._stopwatch.stage("query"):
             candidates = self._detector.query(view)
             self._detector.add(view)
@@ -94,6 +95,61 @@ class LoopSearch:
         while (further := self._follower.propose(self._keyframes)) is not None:
             outcomes.append(self._verify(further))
         return outcomes
+
+    def find(self, keyframe: Keyframe, frame: Frame, labels: LabelMap | None = None) -> list[Verification]:
+        """Look for a place without taking the keyframe in; arguments and result are those of ``search``."""
+        candidates = self._detector.query(self._view(keyframe, frame, labels))
+        return [self._verifier.verify(keyframe, self._keyframes[one.match], one) for one in candidates]
+
+    def forget(self, ids: Collection[int]) -> None:
+        """Propose these keyframes no more, and free what was kept of them.
+
+        Raises:
+            ConfigError: the detector cannot forget.
+        """
+        self._remembering.forget(ids)
+        self._follower.forget(ids)
+        for number in ids:
+            self._keyframes[number] = without_content(self._keyframes[number])
+        self._forgotten.update(ids)
+
+    def memory(self) -> LoopMemory:
+        """All keyframes that are not forgotten, and what the detector has kept of them.
+
+        Raises:
+            ConfigError: the detector cannot hand it out.
+        """
+        kept = tuple(keyframe for keyframe in self._keyframes if keyframe.id not in self._forgotten)
+        return LoopMemory(kept, self._remembering.looks())
+
+    def recall(self, memory: LoopMemory) -> None:
+        """Take the keyframes of another search, before the first of its own; their ids count from 0.
+
+        Raises:
+            ConfigError: the detector cannot take them.
+            KeyError, ValueError: the memory is another detector's.
+        """
+        try:
+            self._remembering.recall(memory.looks)
+        except (KeyError, ValueError):
+            self._remembering.forget([look.id for look in memory.looks])
+            raise
+        for keyframe in memory.keyframes:
+            self._follower.add(keyframe, self._keyframes[-1] if self._keyframes else None)
+            self._keyframes.append(keyframe)
+
+    @property
+    def _remembering(self) -> Remembering:
+        if not isinstance(self._detector, Remembering):
+            name = getattr(self._detector, "name", type(self._detector).__name__)
+            raise ConfigError(f"The detector '{name}' cannot forget keyframes, nor save or load them.")
+        return self._detector
+
+    def _view(self, keyframe: Keyframe, frame: Frame, labels: LabelMap | None) -> KeyframeView:
+        if labels is None and self._segmenter is not None:
+            with self._stopwatch.stage("segmentation"):
+                labels = self._segmenter.segment(frame.color, frame.source_index)
+        return KeyframeView(keyframe, frame.color, frame.depth, labels)
 
     def _verify(self, candidate: LoopCandidate) -> Verification:
         with self._stopwatch.stage("verify"):

@@ -1,5 +1,7 @@
 """Files from outside, read within limits: regular files alone, no more bytes than a reader expects."""
 
+import contextlib
+import os
 import stat
 import zipfile
 from io import BytesIO
@@ -82,3 +84,23 @@ def read_arrays(
     except Exception as reason:
         raise error(f"{what} {path} is damaged, or no npz file.") from reason
     raise error(f"{what} {path} cannot be read: unpacked it has more than {limit / 1e6:.0f} MB.")
+
+
+def write_whole(path: Path, data: bytes, error: type[SemslamError]) -> None:
+    """Write a file through a neighbour, so that it is whole or as it was, and outlives a power cut.
+
+    Raises:
+        SemslamError: an ``error`` in one sentence.
+    """
+    partial = path.with_name(f".{path.name}.partial")
+    try:
+        with partial.open("wb") as stream:
+            stream.write(data)
+            stream.flush()
+            os.fsync(stream.fileno())
+        partial.replace(path)
+    except (OSError, ValueError) as reason:
+        with contextlib.suppress(OSError, ValueError):
+            partial.unlink()
+        text = (reason.strerror or str(reason)) if isinstance(reason, OSError) else "its name is not usable"
+        raise error(f"{path} cannot be written: {text}.") from reason

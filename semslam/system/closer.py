@@ -1,62 +1,32 @@
 """Loop closing for somebody else's GTSAM program: an RGB-D keyframe in, between-factors out."""
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from concurrent.futures import Future
-from dataclasses import dataclass, replace
 from functools import partial
+from pathlib import Path
+from typing import Any
 
 import gtsam
 import numpy as np
 import numpy.typing as npt
 
-from semslam.backend.graph.chain import OdometryChain
 from semslam.backend.graph.checks import checked_pose
-from semslam.backend.graph.factors import between_factor, read_edges
-from semslam.backend.graph.products import Edge, loop_edge
-from semslam.backend.pose_graph import PoseGraph
+from semslam.backend.graph.factors import read_edges
 from semslam.config import Config
-from semslam.errors import DatasetError, GraphError, shortened
-from semslam.frontend.keyframes import KeyframeBuilder
+from semslam.errors import GraphError, ResultsError, shortened
 from semslam.geometry.poses import PoseLike
-from semslam.geometry.se3 import Transform, adjoint, invert
 from semslam.loop.detector import LoopDetector
-from semslam.loop.search import LoopSearch
+from semslam.loop.memory import LoopMemory
 from semslam.loop.verification.verifier import LoopVerifier
 from semslam.runtime.workers import WorkerKind, answer_of, make_worker, worker_kind
-from semslam.types import Frame, Intrinsics, LabelMap, LoopConstraint, Verification
-
-Noise = Callable[[LoopConstraint], gtsam.noiseModel.Base]
+from semslam.system.database import LoopDatabase, read_database, write_database
+from semslam.system.factors import Closure, LoopFactors, Noise, PlaceMatch
+from semslam.system.finder import LoopFinder, checked_frame, memory_source
+from semslam.types import Intrinsics, LabelMap, LoopConstraint, Transform
 
 POSED = -1
 """Map of all keyframes that come with a pose; one without a pose is a map of its own, numbered by the keyframe."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Closure:
-    """A loop that was handed out.
-
-    Attributes:
-        match_key: the caller's key of the older keyframe.
-        query_key: the caller's key of the newer one.
-        factor: the factor from match to query.
-        constraint: what is known of the loop; its candidate counts keyframes from 0 in the order of ``add``.
-    """
-
-    match_key: int
-    query_key: int
-    factor: gtsam.BetweenFactorPose3
-    constraint: LoopConstraint
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _SearchJob:
-    """A keyframe's images, pose (4, 4), map, and labels where the caller has them."""
-
-    frame: Frame
-    T_world_cam: Transform
-    map_id: int
-    labels: LabelMap | None
 
 
 class LoopCloser:
@@ -103,13 +73,14 @@ class LoopCloser:
         if isinstance(detector, str):
             self._config = self._config.with_changes(detector=detector)
         self._intrinsics = intrinsics
-        self._T_body_cam = checked_pose(np.eye(4) if T_body_cam is None else T_body_cam, "The camera on the body")
-        self._noise = noise
-        self._kernel = kernel
-        own = None if isinstance(detector, str) else detector
-        self._worker = make_worker(worker_kind(worker), partial(_make_search, self._config, own, verifier))
-        self._pending: deque[Future[list[Verification]]] = deque()
+        T_body = checked_pose(np.eye(4) if T_body_cam is None else T_body_cam, "The camera on the body")
+        self._factors = LoopFactors(T_body, noise, kernel)
+        self._detector = None if isinstance(detector, str) else detector
+        self._worker = make_worker(worker_kind(worker), partial(_make_finder, self._config, self._detector, verifier))
+        self._pending: deque[Future[tuple[LoopConstraint, ...]]] = deque()
         self._keys: list[int] = []
+        self._forgotten: set[int] = set()
+        self._posed = POSED
         self._last_timestamp: float | None = None
         self._closures: list[Closure] = []
 
@@ -149,15 +120,102 @@ class LoopCloser:
             before = self._last_timestamp
             timestamp = (0.0 if before is None else before) + self._config.keyframes.interval
         self._check(key, timestamp)
-        frame = self._frame(color, depth, timestamp)
-        if T_world_cam is None:
-            job = _SearchJob(frame, np.eye(4), frame.index, labels)
-        else:
-            job = _SearchJob(frame, checked_pose(T_world_cam, f"The pose of key {key}"), POSED, labels)
+        frame = checked_frame(self._intrinsics, color, depth, len(self._keys), timestamp)
+        pose, map_id = self._placed(T_world_cam, f"The pose of key {key}")
         self._keys.append(key)
         self._last_timestamp = timestamp
+        job = partial(LoopFinder.add, frame=frame, T_world_cam=pose, map_id=map_id, labels=labels)
         self._pending.append(self._worker.submit(job))
         return self.poll()
+
+    def query(
+        self,
+        color: npt.NDArray[np.uint8],
+        depth: npt.NDArray[np.floating],
+        T_world_cam: PoseLike | None = None,
+        timestamp: float | None = None,
+        labels: LabelMap | None = None,
+    ) -> list[PlaceMatch]:
+        """The keyframes that show the place of these images, best first by the detector; nothing is added.
+
+        It waits for its answer, and with a worker for the keyframes that were added before.
+
+        Args:
+            color: as for ``add``.
+            depth: as for ``add``.
+            T_world_cam: as for ``add``; only its direction of gravity is used, by some detectors.
+            timestamp: seconds; keyframes less than ``loops.min_gap`` older are not compared; none = all are.
+            labels: as for ``add``.
+
+        Raises:
+            GraphError: the pose is not rigid.
+            DatasetError: the images do not fit the camera or are of the wrong type.
+        """
+        if timestamp is None:
+            timestamp = (self._last_timestamp or 0.0) + self._config.loops.min_gap
+        frame = checked_frame(self._intrinsics, color, depth, len(self._keys), timestamp)
+        pose, map_id = self._placed(T_world_cam, "The pose of the query")
+        job = partial(LoopFinder.query, frame=frame, T_world_cam=pose, map_id=map_id, labels=labels)
+        found: tuple[LoopConstraint, ...] = answer_of(self._worker.submit(job))
+        return [self._factors.match(constraint, self._keys) for constraint in found]
+
+    def forget(self, keys: Iterable[int]) -> None:
+        """Find no loops to these keyframes any more, and free their memory; a few bytes for each remain.
+
+        Their keys cannot be used again, and closures that were handed out stay in ``closures``. The detector's index
+        is built anew, so several at once cost no more than one.
+
+        Raises:
+            GraphError: a key was never added, or was forgotten before.
+            ConfigError: the detector is one of your own that cannot forget.
+        """
+        memory_source(self._detector, self._config)
+        numbers = {key: number for number, key in enumerate(self._keys) if number not in self._forgotten}
+        ids = []
+        for key in dict.fromkeys(keys):
+            if key not in numbers:
+                raise GraphError(f"There is no keyframe of the key {key} to forget.")
+            ids.append(numbers[key])
+        self._forgotten.update(ids)
+        self._worker.submit(partial(LoopFinder.forget, ids=tuple(ids)))
+
+    def save(self, path: str | Path) -> None:
+        """Write all keyframes that are not forgotten, with their keys, into a file that ``load`` reads.
+
+        It waits until all keyframes have been searched. The file is whole or as it was; closures are not in it.
+
+        Raises:
+            ResultsError: the file cannot be written.
+            ConfigError: the detector is one of your own that cannot hand its memory out.
+        """
+        source = memory_source(self._detector, self._config)
+        memory: LoopMemory = answer_of(self._worker.submit(LoopFinder.memory))
+        keys = tuple(self._keys[keyframe.id] for keyframe in memory.keyframes)
+        write_database(Path(path), LoopDatabase(source, keys, memory.renumbered()))
+
+    def load(self, path: str | Path) -> None:
+        """Take the keyframes of a file as if they had been added here, without their closures.
+
+        New keyframes must be later than these. Poses of theirs need not be in the same world.
+
+        Raises:
+            ResultsError: the file cannot be read, is damaged, or is of another version.
+            ConfigError: it was written with another detector or other settings of it, or the detector cannot load.
+            GraphError: keyframes were added before.
+        """
+        source = memory_source(self._detector, self._config)
+        if self._keys:
+            raise GraphError("A loop database can be loaded only before the first keyframe is added.")
+        database = read_database(Path(path))
+        database.source.check(source, path)
+        try:
+            answer_of(self._worker.submit(partial(LoopFinder.recall, memory=database.memory)))
+        except (KeyError, ValueError) as error:
+            raise ResultsError(f"{path} does not hold what the detector '{source.detector}' keeps.") from error
+        keyframes = database.memory.keyframes
+        self._keys = list(database.keys)
+        self._last_timestamp = keyframes[-1].timestamp if keyframes else None
+        self._posed = min([0, *(keyframe.map_id for keyframe in keyframes)]) + POSED
 
     def poll(self, wait: bool = False) -> list[gtsam.BetweenFactorPose3]:
         """The factors that were found since the last call of this or of ``add``, in the order of the keyframes.
@@ -167,8 +225,7 @@ class LoopCloser:
         """
         found: list[Closure] = []
         while self._pending and (wait or self._pending[0].done()):
-            verifications = answer_of(self._pending.popleft())
-            found += [self._closure(one) for one in verifications if isinstance(one, LoopConstraint)]
+            found += [self._factors.closure(one, self._keys) for one in answer_of(self._pending.popleft())]
         self._closures += found
         return [closure.factor for closure in found]
 
@@ -194,26 +251,9 @@ class LoopCloser:
         """
         if not self._closures:
             return []
-        verdicts = self._own_graph(read_edges(graph)).optimize().verdicts
+        own = self._factors.graph(self._keys, read_edges(graph), self._closures, self._config.backend)
+        verdicts = own.optimize().verdicts
         return [closure for closure, verdict in zip(self._closures, verdicts, strict=True) if verdict.accepted]
-
-    def _own_graph(self, edges: list[Edge]) -> PoseGraph:
-        """The closer's keyframes, counted from 0, with the odometry between them and all closures."""
-        known = {key for edge in edges for key in (edge.from_key, edge.to_key)}
-        chain = OdometryChain(known.union(self._keys), edges)
-        steps = zip(*chain.relative(self._keys[:-1], self._keys[1:]), strict=True)
-        graph = PoseGraph(self._config.backend)
-        T: Transform = np.eye(4)
-        graph.add_keyframe(0, T)
-        for number, (T_last_this, covariance, joined) in enumerate(steps, 1):
-            T = T @ T_last_this if joined else np.eye(4)
-            graph.add_keyframe(number, T)
-            if joined:
-                graph.add_odometry(number - 1, number, T_last_this, covariance)
-        for closure in self._closures:
-            edge = self._edge(closure.constraint, closure.match_key, closure.query_key)
-            graph.add_loop(replace(closure.constraint, T_match_query=edge.T_from_to, covariance=edge.covariance))
-        return graph
 
     def contradicted(self, values: gtsam.Values) -> list[Closure]:
         """Closures that lie farther from these estimates than a true one should (``backend.max_residual``).
@@ -225,23 +265,13 @@ class LoopCloser:
         """
         limit = self._config.backend.max_residual
         present = [c for c in self._closures if values.exists(c.match_key) and values.exists(c.query_key)]
-        return [c for c in present if self._residual(c, values) > limit]
+        return [c for c in present if self._factors.residual(c, values) > limit]
 
-    def _residual(self, closure: Closure, values: gtsam.Values) -> float:
-        factor = between_factor(self._edge(closure.constraint, closure.match_key, closure.query_key))
-        return float(np.sqrt(2.0 * factor.error(values)))
-
-    def _closure(self, constraint: LoopConstraint) -> Closure:
-        match_key, query_key = self._keys[constraint.candidate.match], self._keys[constraint.candidate.query]
-        edge = self._edge(constraint, match_key, query_key)
-        noise = None if self._noise is None else self._noise(constraint)
-        return Closure(match_key, query_key, between_factor(edge, self._kernel, noise), constraint)
-
-    def _edge(self, constraint: LoopConstraint, match_key: int, query_key: int) -> Edge:
-        seen = loop_edge(constraint)
-        Ad = adjoint(self._T_body_cam)
-        T_match_query = self._T_body_cam @ seen.T_from_to @ invert(self._T_body_cam)
-        return Edge(match_key, query_key, T_match_query, Ad @ seen.covariance @ Ad.T)
+    def _placed(self, T_world_cam: PoseLike | None, what: str) -> tuple[Transform, int]:
+        """A keyframe's pose and the map that it is in."""
+        if T_world_cam is None:
+            return np.eye(4), len(self._keys)
+        return checked_pose(T_world_cam, what), self._posed
 
     def _check(self, key: int, timestamp: float) -> None:
         if not isinstance(key, int | np.integer):
@@ -254,27 +284,9 @@ class LoopCloser:
         if not np.isfinite(timestamp) or (before is not None and timestamp <= before):
             raise GraphError(f"The stamp {timestamp} does not lie after the keyframe before.")
 
-    def _frame(self, color: npt.NDArray[np.uint8], depth: npt.NDArray[np.floating], timestamp: float) -> Frame:
-        size = (self._intrinsics.height, self._intrinsics.width)
-        color, depth = np.asarray(color), np.asarray(depth)
-        if color.shape != (*size, 3) or color.dtype != np.uint8:
-            raise DatasetError(f"A colour image must be {(*size, 3)} uint8, not {color.shape} {color.dtype}.")
-        if depth.shape != size or not np.issubdtype(depth.dtype, np.floating):
-            raise DatasetError(f"A depth image must be {size} in metres, not {depth.shape} {depth.dtype}.")
-        usable = np.isfinite(depth) & (depth > 0)
-        metres = np.where(usable, depth, 0.0).astype(np.float32)
-        # A copy, since a worker may read it when the caller already writes the next image into the same array.
-        return Frame(len(self._keys), timestamp, color.copy(), metres, self._intrinsics)
 
-
-def _make_search(
+def _make_finder(
     config: Config, detector: LoopDetector | None, verifier: LoopVerifier | None
-) -> Callable[[_SearchJob], list[Verification]]:
-    search = LoopSearch.from_config(config, detector=detector, verifier=verifier)
-    builder = KeyframeBuilder(config)
-
-    def work(job: _SearchJob) -> list[Verification]:
-        keyframe = builder.build_at(job.frame, job.T_world_cam, job.map_id)
-        return search.search(keyframe, job.frame, job.labels)
-
-    return work
+) -> Callable[[Callable[[LoopFinder], Any]], Any]:
+    finder = LoopFinder(config, detector, verifier)
+    return lambda job: job(finder)

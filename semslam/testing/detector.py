@@ -2,13 +2,13 @@
 
 import gc
 import weakref
-from typing import ClassVar
+from typing import ClassVar, cast
 
 import numpy as np
 import pytest
 
 from semslam.config import Config
-from semslam.loop.detector import LoopDetector
+from semslam.loop.detector import LoopDetector, Remembering
 from semslam.testing.scenes import blank, place
 from semslam.testing.settings import check_settings
 from semslam.types import Float32Array, UInt8Array
@@ -84,6 +84,50 @@ class DetectorContract:
         """``loops.max_candidates`` limits what one query returns."""
         one = self.config.with_changes(loops={"max_candidates": 1})
         assert len(self.filled(one).query(place(50, 2))) <= 1
+
+    def remembering(self) -> Remembering:
+        """A filled detector that can forget; the test is skipped where it states that it cannot."""
+        detector = self.filled()
+        if not isinstance(detector, Remembering):
+            pytest.skip("it cannot forget keyframes")
+        return detector
+
+    def test_what_is_forgotten_was_never_added(self) -> None:
+        """The others are found as by a detector to which only they were added; unknown keyframes are passed over."""
+        forgetful = self.remembering()
+        forgetful.forget([2, 4, 1000])
+        other = self.make()
+        for number in range(PLACES):
+            if number not in (2, 4):
+                other.add(place(number, number))
+        for number in range(PLACES):
+            found = cast(LoopDetector, forgetful).query(place(50, number))
+            assert found == other.query(place(50, number))
+            assert not {2, 4} & {candidate.match for candidate in found}
+
+    def test_a_detector_goes_on_after_it_has_forgotten_everything(self) -> None:
+        """It finds nothing, and what is added then."""
+        forgetful = self.remembering()
+        forgetful.forget(range(PLACES))
+        detector = cast(LoopDetector, forgetful)
+        assert detector.query(place(50, 2)) == []
+        assert forgetful.looks() == ()
+        detector.add(place(60, 2))
+        assert not self.proposes or detector.query(place(70, 2))[0].match == 60
+
+    def test_its_memory_can_be_handed_to_another(self) -> None:
+        """A detector that recalls the looks of another one finds the same, keeps the same, and goes on."""
+        first = self.remembering()
+        looks = first.looks()
+        second = self.make()
+        cast(Remembering, second).recall(looks)
+        assert second.query(place(50, 2)) == cast(LoopDetector, first).query(place(50, 2))
+        again = cast(Remembering, second).looks()
+        assert [(look.id, look.timestamp) for look in again] == [(look.id, look.timestamp) for look in looks]
+        for one, other in zip(looks, again, strict=True):
+            assert set(one.arrays) == set(other.arrays)
+            assert all(np.array_equal(one.arrays[name], other.arrays[name]) for name in one.arrays)
+            assert all(array.ndim >= 1 and array.dtype.kind in "biuf" for array in one.arrays.values())
 
     def test_images_are_not_kept(self) -> None:
         """Memory must not grow by an image for each keyframe."""

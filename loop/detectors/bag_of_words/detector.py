@@ -5,10 +5,10 @@ from typing import Self
 import numpy as np
 
 from semslam.config import Config, LoopConfig, Section, setting
+from semslam.loop.detector import Arrays
 from semslam.loop.detectors.bag_of_words.vocabulary import Vocabulary, load_vocabulary
-from semslam.loop.detectors.bag_of_words.word_index import Bag, WordIndex
-from semslam.loop.detectors.common.memo import LastView
-from semslam.loop.detectors.common.timeline import Timeline
+from semslam.loop.detectors.bag_of_words.word_index import Bag, WordIndex, bag_of_arrays, bag_to_arrays
+from semslam.loop.detectors.common.remembering import RememberingDetector
 from semslam.types import FloatArray, KeyframeView, LoopCandidate, LoopEvidence, UInt8Array
 
 
@@ -19,7 +19,7 @@ class DbowConfig(Section):
     min_score: float = setting(0.04, "score of a candidate", ge=0, le=1)
 
 
-class DbowDetector:
+class DbowDetector(RememberingDetector[Bag]):
     """Vocabulary tree, tf-idf, L1 score, inverted file, temporal grouping.
 
     Images that follow each other within ``group`` seconds are grouped: the score with a keyframe is the mean over
@@ -32,11 +32,10 @@ class DbowDetector:
     Settings = DbowConfig
 
     def __init__(self, vocabulary: Vocabulary, config: DbowConfig, loops: LoopConfig) -> None:
+        super().__init__(loops, config.min_score)
         self._vocabulary = vocabulary
         self._group = config.group
-        self._timeline = Timeline(loops, config.min_score)
         self._index = WordIndex()
-        self._bag = LastView(lambda view: make_bag(vocabulary, view.keyframe.features.descriptors))
 
     @classmethod
     def from_config(cls, config: Config) -> Self:
@@ -51,7 +50,7 @@ class DbowDetector:
         """Candidates by grouped score."""
         if not len(self._timeline):
             return []
-        alone = self._index.scores(self._bag(view))
+        alone = self._index.scores(self._look(view))
         scores = grouped(alone, self._timeline.stamps, self._group)
         return [
             LoopCandidate(
@@ -61,10 +60,20 @@ class DbowDetector:
             for at in self._timeline.best(view.keyframe, scores)
         ]  # fmt: skip
 
-    def add(self, view: KeyframeView) -> None:
-        """Remember the view's words."""
-        self._index.add(self._bag(view))
-        self._timeline.add(view.keyframe)
+    def _describe(self, view: KeyframeView) -> Bag:
+        return make_bag(self._vocabulary, view.keyframe.features.descriptors)
+
+    def _clear(self) -> None:
+        self._index = WordIndex()
+
+    def _enter(self, look: Bag) -> None:
+        self._index.add(look)
+
+    def _to_arrays(self, look: Bag) -> Arrays:
+        return bag_to_arrays(look)
+
+    def _from_arrays(self, arrays: Arrays) -> Bag:
+        return bag_of_arrays(arrays)
 
 
 def make_bag(vocabulary: Vocabulary, descriptors: UInt8Array) -> Bag:

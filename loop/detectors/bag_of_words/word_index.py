@@ -4,11 +4,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from semslam.loop.detector import Arrays
 from semslam.loop.detectors.common.growing import GrowingArray
 from semslam.types import Float32Array, FloatArray, IntArray
 
 Bag = tuple[IntArray, Float32Array]
 """Words of an image, ascending, and their tf-idf weights, which add up to one."""
+
 
 RECENT = 128
 """Images that are kept in the order they came before they are sorted into an inverted file."""
@@ -43,6 +45,19 @@ class _Inverted:
         ends = np.cumsum(counts)
         entries = np.repeat(first - ends + counts, counts) + np.arange(ends[-1] if len(ends) else 0)
         return self.images[entries], np.minimum(np.repeat(bag[1], counts), self.weights[entries])
+
+
+def bag_to_arrays(bag: Bag) -> Arrays:
+    """A bag as named arrays."""
+    return {"words": bag[0], "weights": bag[1]}
+
+
+def bag_of_arrays(arrays: Arrays) -> Bag:
+    """The reverse; a KeyError or ValueError where they are no bag."""
+    words, weights = np.asarray(arrays["words"], np.int64), np.asarray(arrays["weights"], np.float32)
+    if words.ndim != 1 or words.shape != weights.shape or words.min(initial=0) < 0:
+        raise ValueError("no bag of words")
+    return words, weights
 
 
 class WordIndex:

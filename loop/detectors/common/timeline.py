@@ -27,8 +27,12 @@ class Timeline:
 
     def add(self, keyframe: Keyframe) -> None:
         """Remember a keyframe; its position is the count of those before it."""
-        self._ids.append([keyframe.id])
-        self._stamps.append([keyframe.timestamp])
+        self.append(keyframe.id, keyframe.timestamp)
+
+    def append(self, identity: int, timestamp: float) -> None:
+        """The same by its identity and stamp."""
+        self._ids.append([identity])
+        self._stamps.append([timestamp])
 
     @property
     def stamps(self) -> FloatArray:

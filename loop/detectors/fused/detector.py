@@ -1,26 +1,27 @@
 """Semantics together with the rest of the image: the question that the paper leaves open in its section 5."""
 
 from dataclasses import dataclass
-from typing import Self
+from typing import Any, Self
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 
 from semslam.config import Config, LoopConfig, Section, setting
 from semslam.errors import ConfigError
+from semslam.loop.detector import Arrays
 from semslam.loop.detectors.bag_of_words.detector import make_bag
 from semslam.loop.detectors.bag_of_words.vocabulary import Vocabulary, load_vocabulary
-from semslam.loop.detectors.bag_of_words.word_index import Bag, WordIndex
+from semslam.loop.detectors.bag_of_words.word_index import Bag, WordIndex, bag_of_arrays, bag_to_arrays
 from semslam.loop.detectors.common.backbone import Backbone
 from semslam.loop.detectors.common.cosine_index import WholeIndex
-from semslam.loop.detectors.common.memo import LastView
-from semslam.loop.detectors.common.timeline import Timeline
+from semslam.loop.detectors.common.remembering import RememberingDetector
 from semslam.loop.detectors.fused.class_index import ClassIndex
 from semslam.loop.detectors.fused.fusion import ClassFeatures, FusionModel, load_fusion, pool_classes
 from semslam.loop.detectors.fused.upright import roll_of, turn_image, turn_labels
 from semslam.loop.segmentation.classes import MOVABLE
 from semslam.loop.segmentation.decoding import shrink
-from semslam.types import Float32Array, FloatArray, KeyframeView, LoopCandidate, LoopEvidence, UInt8Array
+from semslam.types import Float32Array, FloatArray, KeyframeView, LoopCandidate, LoopEvidence
 
 MIDDLE_CHANNELS = 96
 
@@ -42,7 +43,7 @@ class _Look:
     classes: ClassFeatures
 
 
-class FusedDetector:
+class FusedDetector(RememberingDetector[_Look]):
     """Features of the whole image, its words, and features of each class in it, joined to a probability.
 
     - whole: two layers of the encoder, pooled to one vector by a generalised mean of their positive and negative
@@ -65,14 +66,10 @@ class FusedDetector:
     def __init__(
         self, backbone: Backbone, vocabulary: Vocabulary, model: FusionModel, config: FusedConfig, loops: LoopConfig
     ) -> None:
+        super().__init__(loops, config.min_probability)
         self._backbone, self._vocabulary, self._model, self._config = backbone, vocabulary, model, config
         self._max_candidates = loops.max_candidates
-        self._timeline = Timeline(loops, config.min_probability)
-        self._whole = WholeIndex(model.projection.shape[1])
-        self._words = WordIndex()
-        self._classes = ClassIndex(MIDDLE_CHANNELS)
-        self._labels: list[UInt8Array] = []
-        self._look = LastView(self._describe)
+        self._clear()
 
     @classmethod
     def from_config(cls, config: Config) -> Self:
@@ -98,14 +95,28 @@ class FusedDetector:
         chosen = self._choose(view, probability, parts[:, 1])
         return [self._candidate(view, at, float(probability[at]), parts[at]) for at in chosen]
 
-    def add(self, view: KeyframeView) -> None:
-        """Remember the view's features."""
-        look = self._look(view)
+    def _clear(self) -> None:
+        self._whole = WholeIndex(self._model.projection.shape[1])
+        self._words = WordIndex()
+        self._classes = ClassIndex(MIDDLE_CHANNELS)
+
+    def _enter(self, look: _Look) -> None:
         self._whole.add(look.whole)
         self._words.add(look.bag)
         self._classes.add(look.classes)
-        self._labels.append(look.classes.labels)
-        self._timeline.add(view.keyframe)
+
+    def _to_arrays(self, look: _Look) -> Arrays:
+        classes = look.classes
+        arrays: dict[str, npt.NDArray[Any]] = {"whole": look.whole, **bag_to_arrays(look.bag)}
+        return arrays | {"labels": classes.labels, "vectors": classes.vectors, "shares": classes.shares}
+
+    def _from_arrays(self, arrays: Arrays) -> _Look:
+        labels = np.asarray(arrays["labels"], np.uint8)
+        vectors, shares = np.asarray(arrays["vectors"], np.float32), np.asarray(arrays["shares"], np.float64)
+        if vectors.shape != (len(labels), MIDDLE_CHANNELS) or shares.shape != labels.shape:
+            raise ValueError("no class features")
+        whole = np.asarray(arrays["whole"], np.float32)
+        return _Look(whole, bag_of_arrays(arrays), ClassFeatures(labels, vectors, shares))
 
     def _describe(self, view: KeyframeView) -> _Look:
         if view.labels is None:
@@ -137,7 +148,7 @@ class FusedDetector:
 
     def _candidate(self, view: KeyframeView, at: int, probability: float, parts: FloatArray) -> LoopCandidate:
         assert view.labels is not None
-        common = np.intersect1d(self._look(view).classes.labels, self._labels[at])
+        common = np.intersect1d(self._look(view).classes.labels, self._looks[at].classes.labels)
         labels = tuple(view.labels.names[label] for label in common)
         figures = {"whole": float(parts[0]), "words": float(parts[1]), "classes": float(parts[2])}
         evidence = LoopEvidence(labels, figures=figures)

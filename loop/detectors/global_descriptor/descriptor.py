@@ -1,17 +1,17 @@
 """Detectors that describe a whole image by one vector and compare vectors by their cosine."""
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 
 import numpy as np
 
 from semslam.config import LoopConfig
+from semslam.loop.detector import Arrays
 from semslam.loop.detectors.common.growing import GrowingArray
-from semslam.loop.detectors.common.memo import LastView
-from semslam.loop.detectors.common.timeline import Timeline
+from semslam.loop.detectors.common.remembering import RememberingDetector
 from semslam.types import Float32Array, KeyframeView, LoopCandidate, LoopEvidence
 
 
-class DescriptorDetector(ABC):
+class DescriptorDetector(RememberingDetector[Float32Array]):
     """Nearest neighbours among image descriptors; the score is the cosine, 0 where it is negative.
 
     Args:
@@ -27,9 +27,8 @@ class DescriptorDetector(ABC):
     needs_labels = False
 
     def __init__(self, loops: LoopConfig, min_score: float) -> None:
-        self._timeline = Timeline(loops, min_score)
+        super().__init__(loops, min_score)
         self._rows: GrowingArray[np.float32] | None = None
-        self._last = LastView(lambda view: _unit(self.describe(view)))
 
     @abstractmethod
     def describe(self, view: KeyframeView) -> Float32Array:
@@ -39,7 +38,7 @@ class DescriptorDetector(ABC):
         """Candidates by cosine."""
         if self._rows is None:
             return []
-        scores = np.clip(self._rows.rows @ self._last(view), 0.0, 1.0).astype(np.float64)
+        scores = np.clip(self._rows.rows @ self._look(view), 0.0, 1.0).astype(np.float64)
         return [
             LoopCandidate(
                 view.keyframe.id, self._timeline.id_at(at), float(scores[at]), self.name,
@@ -48,13 +47,22 @@ class DescriptorDetector(ABC):
             for at in self._timeline.best(view.keyframe, scores)
         ]  # fmt: skip
 
-    def add(self, view: KeyframeView) -> None:
-        """Remember the view's descriptor."""
-        descriptor = self._last(view)
+    def _describe(self, view: KeyframeView) -> Float32Array:
+        return _unit(self.describe(view))
+
+    def _clear(self) -> None:
+        self._rows = None
+
+    def _enter(self, look: Float32Array) -> None:
         if self._rows is None:
-            self._rows = GrowingArray(np.float32, descriptor.shape)
-        self._rows.append(descriptor[None])
-        self._timeline.add(view.keyframe)
+            self._rows = GrowingArray(np.float32, look.shape)
+        self._rows.append(look[None])
+
+    def _to_arrays(self, look: Float32Array) -> Arrays:
+        return {"descriptor": look}
+
+    def _from_arrays(self, arrays: Arrays) -> Float32Array:
+        return np.asarray(arrays["descriptor"], dtype=np.float32)
 
 
 def _unit(vector: Float32Array) -> Float32Array:

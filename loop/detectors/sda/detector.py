@@ -7,9 +7,9 @@ import cv2
 import numpy as np
 
 from semslam.config import Config, LoopConfig
+from semslam.loop.detector import Arrays
 from semslam.loop.detectors.common.growing import GrowingArray
-from semslam.loop.detectors.common.memo import LastView
-from semslam.loop.detectors.common.timeline import Timeline
+from semslam.loop.detectors.common.remembering import RememberingDetector
 from semslam.loop.detectors.sda.autoencoder import Autoencoder, load_autoencoder
 from semslam.types import Float32Array, FloatArray, KeyframeView, LoopCandidate, LoopEvidence, UInt8Array
 
@@ -21,7 +21,7 @@ REACH = 2
 MIN_SCORE = 0.82
 
 
-class SdaDetector:
+class SdaDetector(RememberingDetector[Float32Array]):
     """Hidden codes of patches around keypoints, compared patch by patch.
 
     The strongest corner of each cell of an 8 x 6 grid gives a patch of 41 x 41 pixels; two layers turn it into a
@@ -34,9 +34,9 @@ class SdaDetector:
     needs_labels = False
 
     def __init__(self, loops: LoopConfig, network: Autoencoder) -> None:
-        self._timeline = Timeline(loops, MIN_SCORE)
-        self._codes = GrowingArray(np.float32, (COLUMNS * ROWS, network.size))
-        self._encode = LastView(lambda view: network.encode(cut_patches(view.color)))
+        super().__init__(loops, MIN_SCORE)
+        self._network = network
+        self._clear()
 
     @classmethod
     def from_config(cls, config: Config) -> Self:
@@ -49,7 +49,7 @@ class SdaDetector:
 
     def query(self, view: KeyframeView) -> list[LoopCandidate]:
         """Candidates by mean similarity of patches."""
-        scores = _similarity(self._encode(view), self._codes.rows)
+        scores = _similarity(self._look(view), self._codes.rows)
         return [
             LoopCandidate(
                 view.keyframe.id, self._timeline.id_at(at), float(scores[at]), self.name,
@@ -58,10 +58,20 @@ class SdaDetector:
             for at in self._timeline.best(view.keyframe, scores)
         ]  # fmt: skip
 
-    def add(self, view: KeyframeView) -> None:
-        """Remember the view's codes."""
-        self._codes.append(self._encode(view)[None])
-        self._timeline.add(view.keyframe)
+    def _describe(self, view: KeyframeView) -> Float32Array:
+        return self._network.encode(cut_patches(view.color))
+
+    def _clear(self) -> None:
+        self._codes = GrowingArray(np.float32, (COLUMNS * ROWS, self._network.size))
+
+    def _enter(self, look: Float32Array) -> None:
+        self._codes.append(look[None])
+
+    def _to_arrays(self, look: Float32Array) -> Arrays:
+        return {"codes": look}
+
+    def _from_arrays(self, arrays: Arrays) -> Float32Array:
+        return np.asarray(arrays["codes"], dtype=np.float32)
 
 
 def cut_patches(color: UInt8Array) -> Float32Array:

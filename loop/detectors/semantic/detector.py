@@ -8,9 +8,9 @@ import numpy.typing as npt
 
 from semslam.config import Config, LoopConfig
 from semslam.errors import ConfigError
+from semslam.loop.detector import Arrays
 from semslam.loop.detectors.common.growing import GrowingArray
-from semslam.loop.detectors.common.memo import LastView
-from semslam.loop.detectors.common.timeline import Timeline
+from semslam.loop.detectors.common.remembering import RememberingDetector
 from semslam.loop.detectors.semantic.nodes import SemanticNodes, extract_nodes
 from semslam.loop.detectors.semantic.settings import (
     DistanceReading,
@@ -24,7 +24,7 @@ from semslam.types import FloatArray, IntArray, KeyframeView, LoopCandidate, Loo
 BoolArray = npt.NDArray[np.bool_]
 
 
-class SemanticDetector:
+class SemanticDetector(RememberingDetector[SemanticNodes]):
     """The paper's comparison, coarse then fine, with tolerant thresholds; the verification decides.
 
     Coarse: two images are compared further where the share of their common labels reaches a threshold (formula 1).
@@ -49,13 +49,9 @@ class SemanticDetector:
     Settings = SemanticConfig
 
     def __init__(self, config: SemanticConfig, loops: LoopConfig) -> None:
+        super().__init__(loops, config.min_node_share)
         self._config = config
-        self._timeline = Timeline(loops, config.min_node_share)
-        self._nodes: list[SemanticNodes] = []
-        self._node_counts = GrowingArray(np.int64)
-        self._label_counts = GrowingArray(np.int64)
-        self._shelves: dict[int, _Shelf] = defaultdict(_Shelf)
-        self._extract = LastView(self._find_nodes)
+        self._clear()
 
     @classmethod
     def from_config(cls, config: Config) -> Self:
@@ -68,24 +64,35 @@ class SemanticDetector:
         Raises:
             ConfigError: the view holds no labels.
         """
-        nodes = self._extract(view)
+        nodes = self._look(view)
         scores, label_shares = self._score(nodes, max(view.depth.shape))
         found = self._timeline.best(view.keyframe, scores)
         return [self._candidate(view, nodes, at, float(scores[at]), float(label_shares[at])) for at in found]
 
-    def add(self, view: KeyframeView) -> None:
-        """Remember the view's nodes."""
-        nodes = self._extract(view)
-        position = len(self._timeline)
-        self._timeline.add(view.keyframe)
-        self._nodes.append(nodes)
-        labels = np.unique(nodes.labels)
-        self._node_counts.append([len(nodes)])
+    def _clear(self) -> None:
+        self._node_counts = GrowingArray(np.int64)
+        self._label_counts = GrowingArray(np.int64)
+        self._shelves: dict[int, _Shelf] = defaultdict(_Shelf)
+
+    def _enter(self, look: SemanticNodes) -> None:
+        position = len(self._node_counts)
+        labels = np.unique(look.labels)
+        self._node_counts.append([len(look)])
         self._label_counts.append([len(labels)])
         for label in labels:
-            self._shelves[int(label)].append(position, nodes.of(label))
+            self._shelves[int(label)].append(position, look.of(label))
 
-    def _find_nodes(self, view: KeyframeView) -> SemanticNodes:
+    def _to_arrays(self, look: SemanticNodes) -> Arrays:
+        return {"labels": look.labels, "uvd": look.uvd, "areas": look.areas}
+
+    def _from_arrays(self, arrays: Arrays) -> SemanticNodes:
+        labels = np.asarray(arrays["labels"], np.uint8)
+        uvd, areas = np.asarray(arrays["uvd"], np.float64), np.asarray(arrays["areas"], np.float64)
+        if uvd.shape != (len(labels), 3) or areas.shape != labels.shape:
+            raise ValueError("no semantic nodes")
+        return SemanticNodes(labels, uvd, areas)
+
+    def _describe(self, view: KeyframeView) -> SemanticNodes:
         if view.labels is None:
             raise ConfigError(f"The detector '{self.name}' needs a segmentation, and none came with the keyframe.")
         return extract_nodes(view.labels, view.depth, self._config.nodes)
@@ -109,7 +116,7 @@ class SemanticDetector:
         self, view: KeyframeView, nodes: SemanticNodes, position: int, score: float, label_share: float
     ) -> LoopCandidate:
         assert view.labels is not None
-        other = self._nodes[position]
+        other = self._looks[position]
         common = np.intersect1d(nodes.labels, other.labels)
         matched: list[NodePair] = []
         for label in common:

@@ -1,0 +1,37 @@
+"""What a search knows of its keyframes, and what is left of one that is forgotten."""
+
+from dataclasses import dataclass, fields, replace
+
+from semslam.loop.detector import Look
+from semslam.types import Cloud, Features, Keyframe
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LoopMemory:
+    """What another search needs to go on.
+
+    Attributes:
+        keyframes: ascending by id.
+        looks: what the detector has kept of them.
+    """
+
+    keyframes: tuple[Keyframe, ...]
+    looks: tuple[Look, ...]
+
+    def renumbered(self) -> "LoopMemory":
+        """The same with ids that count from 0; a map that is one keyframe's own is numbered as it is."""
+        place = {keyframe.id: number for number, keyframe in enumerate(self.keyframes)}
+        return LoopMemory(
+            tuple(
+                replace(k, id=place[k.id], map_id=place[k.id] if k.map_id == k.id else k.map_id) for k in self.keyframes
+            ),
+            tuple(replace(look, id=place[look.id]) for look in self.looks if look.id in place),
+        )
+
+
+def without_content(keyframe: Keyframe) -> Keyframe:
+    """A keyframe without keypoints and points."""
+    features, cloud = keyframe.features, keyframe.cloud
+    no_features = Features(*(getattr(features, field.name)[:0].copy() for field in fields(Features)))
+    no_cloud = Cloud(cloud.points[:0].copy(), cloud.normals[:0].copy())
+    return replace(keyframe, features=no_features, cloud=no_cloud, details=None)
