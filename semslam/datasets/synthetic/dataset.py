@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property, lru_cache
 from pathlib import Path
-from typing import ClassVar, Self
+from typing import ClassVar, Literal, Self
 from urllib.parse import parse_qsl
 
 import numpy as np
@@ -39,6 +39,7 @@ class Request(Section):
     frames: int = Field(0, ge=0, description="maximum number of frames; 0 = the whole way")
     rate: float = Field(10.0, gt=0, le=1000, description="frames a second")
     width: int = Field(320, ge=64, le=4096, multiple_of=4, description="pixels; the height is three quarters of it")
+    way: Literal["again", "back"] = Field("again", description="whether the second pass repeats the first or goes back")
     light: str = Field("same", description="light of the second pass: " + ", ".join(LIGHTS))
     offset: float = Field(0.0, ge=-1, le=1, description="metres that the second pass keeps to the right of the first")
     moved: bool = Field(False, description="objects moved or missing on the second pass")
@@ -203,9 +204,20 @@ class SyntheticDataset:
         """What stands in the scene, before or after things were moved."""
         return PLANS[self._scene].build(self._request.seed, moved).parts
 
+    @property
+    def rooms(self) -> npt.NDArray[np.int64]:
+        """Which of the scene's rooms each frame's camera stands in, (N,); -1 for none."""
+        x, y = self._walk.poses[:, 0, 3], self._walk.poses[:, 1, 3]
+        rooms = np.full(len(x), -1, dtype=np.int64)
+        for number, (x0, y0, x1, y1) in enumerate(PLANS[self._scene].rooms):
+            rooms[(x >= x0) & (x < x1) & (y >= y0) & (y < y1)] = number
+        return rooms
+
     @cached_property
     def _way(self) -> Way:
-        return Way(PLANS[self._scene].route, self._request.seed, self._request.offset, self._request.sway)
+        request, plan = self._request, PLANS[self._scene]
+        route = plan.back if request.way == "back" else plan.route
+        return Way(route, request.seed, request.offset, request.sway)
 
     @cached_property
     def _walk(self) -> Walk:

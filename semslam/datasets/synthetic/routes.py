@@ -23,18 +23,22 @@ class Stop:
 
 @dataclass(frozen=True, slots=True)
 class Route:
-    """A way that returns to its start.
+    """A way that is passed twice.
 
     Attributes:
-        stops: the first pass; the last stop is the first one again, but for whole turns.
+        stops: the first pass; unless the way goes back, the last stop is the first one again, but for whole turns.
         again: how many of them the second pass follows.
+        back: whether the second pass begins at the last stop and goes back, looking ahead as the first one did.
     """
 
     stops: tuple[Stop, ...]
     again: int
+    back: bool = False
 
     def both_passes(self) -> list[Stop]:
         """All stops of the first and the second pass, the turn's sense kept."""
+        if self.back:
+            return [*self.stops, *(replace(s, yaw=s.yaw + 180.0) for s in self.stops[::-1][: self.again])]
         turns = round((self.stops[-1].yaw - self.stops[0].yaw) / 360.0) * 360.0
         return [*self.stops, *(replace(stop, yaw=stop.yaw + turns) for stop in self.stops[1 : self.again])]
 
@@ -95,3 +99,27 @@ ROOM = Route(
     again=7,
 )  # fmt: skip
 """Once around in one room."""
+
+_HOUSE_THROUGH = (
+    # The corridor, the living room from door to archway, the study from archway to door, the corridor, the kitchen.
+    Stop(0.9, 4.85, 0), Stop(2.4, 4.85, 0), Stop(3.6, 4.8, -20), Stop(4.2, 4.5, -75), Stop(4.3, 3.9, -95),
+    Stop(4.2, 3.4, -112), Stop(3.7, 2.8, -130), Stop(3.1, 2.3, -115), Stop(2.95, 1.7, -75), Stop(3.3, 1.6, -10),
+    Stop(3.9, 2.3, 45), Stop(4.7, 2.95, 15), Stop(5.5, 3.0, -5), Stop(6.2, 2.9, -25), Stop(6.9, 2.5, -15),
+    Stop(7.4, 2.6, 20), Stop(8.1, 3.1, 55), Stop(8.6, 3.7, 88), Stop(8.6, 4.5, 105), Stop(8.2, 4.85, 165),
+    Stop(7.4, 4.85, 180), Stop(6.4, 4.85, 178), Stop(5.8, 5.0, 130), Stop(5.6, 5.6, 92), Stop(5.65, 6.4, 80),
+    Stop(6.0, 7.3, 55), Stop(6.8, 8.0, 20), Stop(7.4, 8.1, -20),
+)  # fmt: skip
+HOUSE_BACK = Route(_HOUSE_THROUGH, len(_HOUSE_THROUGH), back=True)
+"""Through the house, looking ahead; then the same way back."""
+
+_TWINS_THROUGH = (
+    Stop(1.6, 4.85, 0), Stop(3.2, 4.85, -5), Stop(4.1, 4.6, -55),
+    *(replace(stop, yaw=stop.yaw - 360.0) for stop in shifted(_STUDY_TOUR, *TWIN_CORNERS[0])),
+    Stop(4.34, 4.2, 80), Stop(4.6, 4.75, 30), Stop(6.4, 4.9, 0), Stop(8.0, 4.85, -20), Stop(8.55, 4.3, -80),
+    *(replace(stop, yaw=stop.yaw - 360.0) for stop in shifted(_STUDY_TOUR, *TWIN_CORNERS[1])),
+    Stop(8.6, 4.3, 90), Stop(8.55, 4.75, 120),
+)  # fmt: skip
+TWINS_BACK = Route(_TWINS_THROUGH, len(_TWINS_THROUGH), back=True)
+"""The corridor and both rooms; then the same way back."""
+ROOM_BACK = Route(ROOM.stops, len(ROOM.stops), back=True)
+"""Once around in one room, and once around the other way."""

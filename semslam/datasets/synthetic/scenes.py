@@ -13,6 +13,7 @@ from semslam.datasets.synthetic.scene import Light, Scene
 from semslam.datasets.synthetic.shapes import Part, placed
 
 Surfaces = tuple[list[Part], list[Light]]
+Corners = tuple[float, float, float, float]
 CORRIDOR_NORTH, CORRIDOR_SOUTH = 5.65, 4.05
 """Middle of the walls on both sides of the corridor, y in metres."""
 
@@ -24,10 +25,14 @@ class Plan:
     Attributes:
         furnish: gives all surfaces and lights for a seed, before or after things were moved.
         route: the camera's way.
+        back: the way that goes back where it came from.
+        rooms: each room's smallest and largest x and y, (x0, y0, x1, y1) in metres.
     """
 
     furnish: Callable[[int, bool], Surfaces]
     route: Route
+    back: Route
+    rooms: tuple[Corners, ...]
 
     def build(self, seed: int, moved: bool) -> Scene:
         """The whole scene, its materials painted.
@@ -98,9 +103,17 @@ def _joined(*rooms: tuple[Room, float, float]) -> Surfaces:
     return parts, lights
 
 
+_CORRIDOR: Corners = (0.0, CORRIDOR_SOUTH, 9.6, CORRIDOR_NORTH)
+_STUDIES: tuple[Corners, ...] = tuple((x, y, x + 4.1, y + 4.0) for x, y in routes.TWIN_CORNERS)
 PLANS = {
-    "house": Plan(_house, routes.HOUSE),
-    "twins": Plan(_twins, routes.TWINS),
-    "room": Plan(_room, routes.ROOM),
-}
+    "house": Plan(
+        _house,
+        routes.HOUSE,
+        routes.HOUSE_BACK,
+        ((0.0, 0.0, 5.45, CORRIDOR_SOUTH), (5.45, 0.0, 9.6, CORRIDOR_SOUTH), _CORRIDOR,
+         (0.0, CORRIDOR_NORTH, 4.45, 9.4), (4.45, CORRIDOR_NORTH, 9.6, 9.4)),
+    ),
+    "twins": Plan(_twins, routes.TWINS, routes.TWINS_BACK, (*_STUDIES, _CORRIDOR)),
+    "room": Plan(_room, routes.ROOM, routes.ROOM_BACK, ((0.0, 0.0, 4.1, 4.0),)),
+}  # fmt: skip
 """house: four rooms and a corridor, 9.6 x 9.4 m. twins: two studies that look alike on one corridor. room: a study."""

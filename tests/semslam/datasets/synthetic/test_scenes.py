@@ -214,3 +214,17 @@ def test_frames_limits_the_length() -> None:
     assert len(room(frames=5)) == 5
     assert room(frames=5).timestamps == room().timestamps[:5]
     assert len(room(rate=20)) == pytest.approx(2 * len(room(rate=10)), abs=1)
+
+
+@pytest.mark.parametrize("scene", sorted(PLANS))
+def test_the_way_back_looks_the_other_way(scene: str) -> None:
+    """The second pass comes by where the first one was, looking back; every camera stands in a room or a doorway."""
+    dataset = SyntheticDataset(scene, Request(width=SMALL, way="back", rate=5))
+    poses, second = dataset.ground_truth.poses, dataset.second_pass
+    gaps = np.linalg.norm(poses[second][:, None, :3, 3] - poses[~second][None, :, :3, 3], axis=2)
+    nearest = gaps.argmin(axis=1)
+    assert gaps.min(axis=1).max() < 0.25
+    cosines = (poses[second][:, :3, 2] * poses[~second][nearest][:, :3, 2]).sum(1)
+    assert np.mean(cosines < -0.5) > 0.7
+    assert np.mean(dataset.rooms >= 0) > 0.9
+    assert set(dataset.rooms[second]) == set(dataset.rooms[~second])
