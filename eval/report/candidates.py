@@ -18,6 +18,7 @@ REASONS = {
     "few_matches": "few matches",
     "few_inliers": "few inliers",
     "no_cloud": "no point cloud",
+    "far_from_guess": "far from the guess",
     "low_fitness": "low fitness",
     "high_rmse": "high RMSE",
     "low_overlap": "low overlap",
@@ -135,6 +136,8 @@ def _groups(loop: LedgerEntry) -> Iterable[Group]:
         proposal.append(("shared classes", ", ".join(loop.evidence.labels)))
     if loop.evidence.nodes:
         proposal.append(("matched nodes", str(len(loop.evidence.nodes))))
+    if loop.evidence.objects:
+        proposal.append(("matched objects", ", ".join(pair.label for pair in loop.evidence.objects)))
     yield "Proposal", proposal
     verification = _verification(loop)
     if verification:

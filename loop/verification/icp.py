@@ -8,8 +8,10 @@ import numpy as np
 from semslam.config import Config, VerificationConfig
 from semslam.geometry.se3 import invert, orthonormalise
 from semslam.loop.verification.free_space import free_space_violation
+from semslam.loop.verification.gates import Gate, first_failed
 from semslam.loop.verification.guess import FeaturePair, Guess, pose_from_nodes
 from semslam.loop.verification.registration import Fit, measure_fit, plane_information, refine
+from semslam.loop.verification.submaps import SubmapRegistration
 from semslam.types import (
     Covariance6,
     FloatArray,
@@ -47,16 +49,6 @@ class _Estimate:
     overlap: float
 
 
-@dataclass(frozen=True, slots=True)
-class _Gate:
-    """A test of an estimate: whether it passed, and the reason, value and limit of a rejection."""
-
-    passed: bool
-    reason: RejectionReason
-    value: float
-    limit: float
-
-
 class IcpVerifier:
     """Initial guesses from features and from semantic nodes, ICP, and gates that test the result.
 
@@ -66,6 +58,9 @@ class IcpVerifier:
     or moves the agreeing features far, as where a view holds one plane. A constraint needs enough agreeing features,
     fitness, a small residual, overlap seen from both sides, no points in space that the other view looked through, and
     a position that is determined.
+
+    A candidate with a guess of its own joins submaps, and their merged clouds are registered instead, since views from
+    opposite sides share no feature.
     """
 
     name = "icp"
@@ -73,6 +68,7 @@ class IcpVerifier:
     def __init__(self, config: VerificationConfig, seed: int) -> None:
         self._config = config
         self._seed = seed
+        self._submaps = SubmapRegistration(config.submaps)
 
     @classmethod
     def from_config(cls, config: Config) -> Self:
@@ -81,6 +77,8 @@ class IcpVerifier:
 
     def verify(self, query: Keyframe, match: Keyframe, candidate: LoopCandidate) -> LoopConstraint | LoopRejection:
         """See ``LoopVerifier``; the reason, value and limit of a rejection are those of the first gate that failed."""
+        if candidate.guess is not None:
+            return self._submaps.verify(query, match, candidate, candidate.guess)
         pair = FeaturePair(query, match, self._config.max_reprojection)
         matches = pair.matches(self._config.match_ratio)
         guess, figures = self._best_guess(query, match, candidate, pair, matches)
@@ -95,9 +93,9 @@ class IcpVerifier:
         T_match_query, fit, method = self._refine(query, match, pair, guess)
         overlap = self._overlap(query, match, T_match_query)
         covariance = self._covariance(query, match, guess, T_match_query, fit, method, overlap)
-        for gate in self._gates(query, match, _Estimate(T_match_query, covariance, fit, overlap)):
-            if not gate.passed:
-                return LoopRejection(candidate, gate.reason, gate.value, gate.limit)
+        failed = first_failed(self._gates(query, match, _Estimate(T_match_query, covariance, fit, overlap)))
+        if failed is not None:
+            return LoopRejection(candidate, failed.reason, failed.value, failed.limit)
         return LoopConstraint(
             candidate, T_match_query, covariance, fit.fitness, fit.rmse, overlap, found, method, figures,
             shared=pair.rows(guess.matches),
@@ -163,7 +161,7 @@ class IcpVerifier:
         back = measure_fit(match.cloud, query.cloud, invert(T_match_query), distance)
         return min(there.fitness, back.fitness)
 
-    def _gates(self, query: Keyframe, match: Keyframe, estimate: _Estimate) -> tuple[_Gate, ...]:
+    def _gates(self, query: Keyframe, match: Keyframe, estimate: _Estimate) -> tuple[Gate, ...]:
         config, fit, overlap = self._config, estimate.fit, estimate.overlap
         filled = max(
             free_space_violation(query.cloud, match.cloud, match.intrinsics, estimate.T_match_query),
@@ -171,11 +169,11 @@ class IcpVerifier:
         )
         sigma = float(np.sqrt(np.linalg.eigvalsh(estimate.covariance[3:, 3:])[-1]))
         return (
-            _Gate(fit.fitness >= config.min_fitness, RejectionReason.LOW_FITNESS, fit.fitness, config.min_fitness),
-            _Gate(fit.rmse <= config.max_rmse, RejectionReason.HIGH_RMSE, fit.rmse, config.max_rmse),
-            _Gate(overlap >= config.min_overlap, RejectionReason.LOW_OVERLAP, overlap, config.min_overlap),
-            _Gate(filled <= config.max_free_space, RejectionReason.FREE_SPACE, filled, config.max_free_space),
-            _Gate(sigma <= config.max_sigma, RejectionReason.DEGENERATE, sigma, config.max_sigma),
+            Gate(fit.fitness >= config.min_fitness, RejectionReason.LOW_FITNESS, fit.fitness, config.min_fitness),
+            Gate(fit.rmse <= config.max_rmse, RejectionReason.HIGH_RMSE, fit.rmse, config.max_rmse),
+            Gate(overlap >= config.min_overlap, RejectionReason.LOW_OVERLAP, overlap, config.min_overlap),
+            Gate(filled <= config.max_free_space, RejectionReason.FREE_SPACE, filled, config.max_free_space),
+            Gate(sigma <= config.max_sigma, RejectionReason.DEGENERATE, sigma, config.max_sigma),
         )
 
 

@@ -13,7 +13,7 @@ from semslam.config.reading import load_config, load_saved_config, parse_overrid
 from semslam.config.section import Section, setting
 from semslam.config.segmentation import SegmentationConfig, TrainingConfig
 from semslam.config.settings import Config
-from semslam.config.verification import VerificationConfig
+from semslam.config.verification import SubmapConfig, VerificationConfig
 
 __all__ = [
     "BackendConfig",
@@ -28,6 +28,7 @@ __all__ = [
     "LoopConfig",
     "Section",
     "SegmentationConfig",
+    "SubmapConfig",
     "TrainingConfig",
     "VerificationConfig",
     "load_config",

@@ -6,6 +6,31 @@ from semslam.config.keypoints import KeypointConfig
 from semslam.config.section import Section, setting
 
 
+class SubmapConfig(Section):
+    """Thresholds between a candidate with a guess and a constraint between submaps."""
+
+    voxel: float = setting(0.05, "side of the voxels that merged clouds are thinned to", unit="m", gt=0)
+    distances: tuple[float, ...] = setting((0.5, 0.25, 0.1, 0.06), "correspondence distance of each ICP pass", unit="m")
+    fit_distance: float = setting(
+        0.06, "distance to the other surface up to which a point is an inlier", unit="m", gt=0
+    )
+    max_shift: float = setting(0.8, "motion that the registration may add to the guess", unit="m", gt=0)
+    max_turn: float = setting(0.35, "rotation that the registration may add to the guess", unit="rad", gt=0)
+    min_points: int = setting(1500, "minimum number of points of each submap", gt=5)
+    min_overlap: float = setting(0.3, "share of either submap that must lie near the other", ge=0, le=1)
+    near: float = setting(0.1, "distance up to which a point counts as overlapping", unit="m", gt=0)
+    max_free_space: float = setting(
+        0.07, "points in the other's free space, as a share of these and the overlapping", ge=0, le=1
+    )
+    max_rmse: float = setting(0.035, "maximum root mean square distance of the inliers", unit="m", gt=0)
+    max_sigma: float = setting(0.25, "maximum standard deviation of the relative position", unit="m", gt=0)
+    inflation: float = setting(200.0, "factor on ICP's formal variance, for correlated errors of its points", gt=0)
+    sigma_rotation: float = setting(
+        0.02, "systematic rotation error, odometry within submaps included", unit="rad", ge=0
+    )
+    sigma_translation: float = setting(0.05, "systematic translation error, likewise", unit="m", ge=0)
+
+
 class VerificationConfig(Section):
     """Thresholds between a candidate and a constraint."""
 
@@ -35,3 +60,4 @@ class VerificationConfig(Section):
     pnp_inflation: float = setting(30.0, "factor on PnP's formal variance", gt=0)
     sigma_rotation: float = setting(0.012, "systematic rotation error at full overlap", unit="rad", ge=0)
     sigma_translation: float = setting(0.012, "systematic translation error at full overlap", unit="m", ge=0)
+    submaps: SubmapConfig = SubmapConfig()

@@ -27,9 +27,7 @@ from semslam.types import (
     Keyframe,
     LoopCandidate,
     LoopConstraint,
-    LoopEvidence,
     LoopRejection,
-    NodePair,
     RejectionReason,
     Verification,
 )
@@ -258,13 +256,7 @@ def _number(value: Any) -> float | int:
 
 def _outcome(values: dict[str, Any]) -> Verification:
     """The reverse of ``_plain``."""
-    candidate = values["candidate"]
-    evidence = candidate["evidence"]
-    nodes = tuple(
-        NodePair(node["label"], tuple(node["query_uvd"]), tuple(node["match_uvd"])) for node in evidence["nodes"]
-    )
-    evidence = LoopEvidence(tuple(evidence["labels"]), nodes, evidence["figures"])
-    values = values | {"candidate": LoopCandidate(**candidate | {"evidence": evidence})}
+    values = values | {"candidate": LoopCandidate.from_plain(values["candidate"])}
     if "reason" in values:
         return LoopRejection(**values | {"reason": RejectionReason(values["reason"])})
     arrays = {name: np.array(values[name]) for name in ("T_match_query", "covariance")}

@@ -25,7 +25,9 @@ from semslam.types.loops import (
     LoopEvidence,
     LoopRejection,
     NodePair,
+    ObjectPair,
     RejectionReason,
+    SubmapGuess,
     Verification,
 )
 from semslam.types.tracking import Motion, Observations, TrackingStatus
@@ -54,9 +56,11 @@ __all__ = [
     "LoopRejection",
     "Motion",
     "NodePair",
+    "ObjectPair",
     "Observations",
     "Points3",
     "RejectionReason",
+    "SubmapGuess",
     "TrackingStatus",
     "Trajectory",
     "Transform",

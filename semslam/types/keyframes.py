@@ -22,6 +22,7 @@ class Keyframe:
         features: keypoints with depth.
         cloud: a thinned cloud with normals.
         details: more keypoints, for the verification of loops; None = the features serve.
+        around: the other keyframes of its submap, while a loop between submaps is verified.
     """
 
     id: int
@@ -33,6 +34,7 @@ class Keyframe:
     features: Features
     cloud: Cloud
     details: Features | None = None
+    around: tuple["Keyframe", ...] = ()
 
     @property
     def finest(self) -> Features:

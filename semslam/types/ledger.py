@@ -6,7 +6,7 @@ from enum import StrEnum
 from typing import Any
 
 from semslam.errors import ResultsError
-from semslam.types.loops import LoopEvidence, NodePair
+from semslam.types.loops import LoopEvidence
 
 
 class LoopJudgement(StrEnum):
@@ -118,15 +118,7 @@ class LedgerEntry:
         """
         try:
             values: dict[str, Any] = json.loads(line)
-            evidence = values["evidence"]
-            values["evidence"] = LoopEvidence(
-                labels=tuple(evidence["labels"]),
-                nodes=tuple(
-                    NodePair(node["label"], tuple(node["query_uvd"]), tuple(node["match_uvd"]))
-                    for node in evidence["nodes"]
-                ),
-                figures=evidence["figures"],
-            )
+            values["evidence"] = LoopEvidence.from_plain(values["evidence"])
             values["verdict"] = LoopOutcome(values["verdict"])
             truth = values["truth"]
             values["truth"] = truth and JudgedLoop(

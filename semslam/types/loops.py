@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 from enum import StrEnum
+from typing import Any, Self
 
 from semslam.types.arrays import Covariance6, IntArray, Transform
 
@@ -22,6 +23,21 @@ class NodePair:
 
 
 @dataclass(frozen=True, slots=True)
+class ObjectPair:
+    """Two objects of submaps that were matched.
+
+    Attributes:
+        label: name of the classes.
+        query_xyz: centroid in the query's camera frame, metres.
+        match_xyz: the same in the match's.
+    """
+
+    label: str
+    query_xyz: tuple[float, float, float]
+    match_xyz: tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
 class LoopEvidence:
     """What made a detector propose a pair.
 
@@ -29,11 +45,46 @@ class LoopEvidence:
         labels: class names both frames share.
         nodes: matched semantic nodes.
         figures: named scores that went into the decision.
+        objects: matched objects of the submaps.
     """
 
     labels: tuple[str, ...] = ()
     nodes: tuple[NodePair, ...] = ()
     figures: dict[str, float] = field(default_factory=dict)
+    objects: tuple[ObjectPair, ...] = ()
+
+    @classmethod
+    def from_plain(cls, values: dict[str, Any]) -> Self:
+        """The reverse of ``dataclasses.asdict`` and JSON."""
+        return cls(
+            tuple(values["labels"]),
+            tuple(NodePair(v["label"], tuple(v["query_uvd"]), tuple(v["match_uvd"])) for v in values["nodes"]),
+            values["figures"],
+            tuple(
+                ObjectPair(v["label"], tuple(v["query_xyz"]), tuple(v["match_xyz"])) for v in values.get("objects", ())
+            ),
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class SubmapGuess:
+    """A relative pose that a detector found between two submaps, the surroundings of the two keyframes.
+
+    Attributes:
+        T_match_query: rows of the (4, 4) pose of the query's camera in the match's.
+        query: ids of the keyframes whose clouds make the query's submap.
+        match: ids of those of the match's.
+    """
+
+    T_match_query: tuple[tuple[float, ...], ...]
+    query: tuple[int, ...]
+    match: tuple[int, ...]
+
+    @classmethod
+    def from_plain(cls, values: dict[str, Any]) -> Self:
+        """The reverse of ``dataclasses.asdict`` and JSON."""
+        rows = tuple(tuple(row) for row in values["T_match_query"])
+        return cls(rows, tuple(values["query"]), tuple(values["match"]))
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +97,7 @@ class LoopCandidate:
         score: 0..1, higher is surer.
         detector: registered name of who proposed it.
         evidence: what agreed.
+        guess: the relative pose of the surroundings, from a detector that finds one; verification then registers these.
     """
 
     query: int
@@ -53,6 +105,14 @@ class LoopCandidate:
     score: float
     detector: str
     evidence: LoopEvidence = LoopEvidence()
+    guess: SubmapGuess | None = None
+
+    @classmethod
+    def from_plain(cls, values: dict[str, Any]) -> Self:
+        """The reverse of ``dataclasses.asdict`` and JSON."""
+        guess = values.get("guess")
+        evidence = LoopEvidence.from_plain(values["evidence"])
+        return cls(**values | {"evidence": evidence, "guess": guess and SubmapGuess.from_plain(guess)})
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -90,6 +150,7 @@ class RejectionReason(StrEnum):
     FEW_MATCHES = "few_matches"
     FEW_INLIERS = "few_inliers"
     NO_CLOUD = "no_cloud"
+    FAR_FROM_GUESS = "far_from_guess"
     LOW_FITNESS = "low_fitness"
     HIGH_RMSE = "high_rmse"
     LOW_OVERLAP = "low_overlap"

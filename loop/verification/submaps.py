@@ -1,0 +1,122 @@
+"""Registration of two submaps, each the clouds of several keyframes, from a detector's guess."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from semslam.config import SubmapConfig
+from semslam.geometry.se3 import FloatArray, invert, orthonormalise, rotation_angle, transform_points
+from semslam.geometry.voxels import voxel_keys
+from semslam.loop.verification.free_space import BoolArray, sight_of
+from semslam.loop.verification.gates import Gate, first_failed
+from semslam.loop.verification.registration import Fit, measure_fit, plane_information, refine
+from semslam.types import Cloud, Keyframe, LoopCandidate, LoopConstraint, LoopRejection, RejectionReason, SubmapGuess
+
+
+def with_submap(keyframe: Keyframe, ids: Sequence[int], keyframes: Sequence[Keyframe]) -> Keyframe:
+    """The keyframe with the others of its submap around it; ``keyframes[i].id`` is i."""
+    return replace(keyframe, around=tuple(keyframes[i] for i in ids if i != keyframe.id))
+
+
+def merged_cloud(keyframe: Keyframe, voxel: float) -> Cloud:
+    """The clouds of a keyframe and those around it, by odometry, in its camera frame; one point for each voxel.
+
+    A voxel's point and normal are the means of those in it.
+    """
+    parts = (keyframe, *keyframe.around)
+    poses = [invert(keyframe.T_odom_cam) @ part.T_odom_cam for part in parts]
+    points = np.concatenate([transform_points(T, part.cloud.points) for T, part in zip(poses, parts, strict=True)])
+    normals = np.concatenate([part.cloud.normals @ T[:3, :3].T for T, part in zip(poses, parts, strict=True)])
+    _, owner, counts = np.unique(voxel_keys(points, voxel), return_inverse=True, return_counts=True)
+    means = [
+        np.stack([np.bincount(owner, values[:, k], len(counts)) for k in range(3)], 1) / counts[:, None]
+        for values in (points, normals)
+    ]
+    lengths = np.linalg.norm(means[1], axis=1)
+    kept = lengths > 0.5  # both sides of a thin board in one voxel have no normal
+    return Cloud(
+        means[0][kept].astype(np.float32),
+        (means[1][kept] / lengths[kept, None]).astype(np.float32),
+    )
+
+
+class SubmapRegistration:
+    """From a guess between two submaps to a constraint: ICP on the merged clouds, coarse to fine, behind gates.
+
+    A constraint needs enough points, a registration that stays near the guess, an overlap that is large from both
+    sides, few points in space that any view of the other submap looked through, a small residual and a position that
+    is determined. Nothing in it compares appearance.
+    """
+
+    def __init__(self, config: SubmapConfig) -> None:
+        self._config = config
+
+    def verify(
+        self, query: Keyframe, match: Keyframe, candidate: LoopCandidate, guess: SubmapGuess
+    ) -> LoopConstraint | LoopRejection:
+        """Register the submaps around two keyframes; the rejection names the first gate that failed."""
+        config = self._config
+        ours, theirs = merged_cloud(query, config.voxel), merged_cloud(match, config.voxel)
+        smaller = min(len(ours), len(theirs))
+        if smaller < config.min_points:
+            return LoopRejection(candidate, RejectionReason.NO_CLOUD, smaller, config.min_points)
+        T_guess = np.array(guess.T_match_query)
+        T = orthonormalise(refine(ours, theirs, T_guess, config.distances))
+        fit = measure_fit(ours, theirs, T, config.fit_distance)
+        there, back = measure_fit(ours, theirs, T, config.near), measure_fit(theirs, ours, invert(T), config.near)
+        overlap = min(there.fitness, back.fitness)
+        filled = max(_free_space_share(ours, there, match, T), _free_space_share(theirs, back, query, invert(T)))
+        covariance = self._covariance(ours, theirs, T, fit)
+        gates = self._gates(invert(T_guess) @ T, fit, overlap, filled, covariance)
+        failed = first_failed(gates)
+        if failed is not None:
+            return LoopRejection(candidate, failed.reason, failed.value, failed.limit)
+        figures = {gate.reason.value: gate.value for gate in gates}
+        return LoopConstraint(
+            candidate,
+            T,
+            covariance,
+            fit.fitness,
+            fit.rmse,
+            overlap,
+            len(candidate.evidence.objects),
+            "submaps",
+            figures,
+        )
+
+    def _gates(
+        self, change: FloatArray, fit: Fit, overlap: float, filled: float, covariance: FloatArray
+    ) -> tuple[Gate, ...]:
+        config = self._config
+        moved, turned = float(np.linalg.norm(change[:3, 3])), float(rotation_angle(change))
+        sigma = float(np.sqrt(np.linalg.eigvalsh(covariance[3:, 3:])[-1]))
+        stayed = moved <= config.max_shift and turned <= config.max_turn
+        return (
+            Gate(stayed, RejectionReason.FAR_FROM_GUESS, moved, config.max_shift),
+            Gate(overlap >= config.min_overlap, RejectionReason.LOW_OVERLAP, overlap, config.min_overlap),
+            Gate(filled <= config.max_free_space, RejectionReason.FREE_SPACE, filled, config.max_free_space),
+            Gate(fit.rmse <= config.max_rmse, RejectionReason.HIGH_RMSE, fit.rmse, config.max_rmse),
+            Gate(sigma <= config.max_sigma, RejectionReason.DEGENERATE, sigma, config.max_sigma),
+        )
+
+    def _covariance(self, ours: Cloud, theirs: Cloud, T: FloatArray, fit: Fit) -> FloatArray:
+        """Covariance (6, 6) of T: that of point-to-plane ICP, inflated, and what odometry leaves within submaps."""
+        config = self._config
+        planes = plane_information(ours, theirs, T, fit.pairs)
+        noise = config.inflation * max(fit.rmse, 1e-3) ** 2
+        floor = np.repeat((config.sigma_rotation, config.sigma_translation), 3) ** 2
+        covariance: FloatArray = np.asarray(np.linalg.inv(planes / noise + 1e-6 * np.eye(6))) + np.diag(floor)
+        return (covariance + covariance.T) / 2
+
+
+def _free_space_share(seen: Cloud, fit: Fit, looking: Keyframe, T_looking_seen: FloatArray) -> float:
+    """Points in free space of any view of a submap, as a share of these and of the points that meet its surface."""
+    near: BoolArray = np.zeros(len(seen), dtype=bool)
+    near[fit.pairs[:, 0]] = True
+    blocked: BoolArray = np.zeros(len(seen), dtype=bool)
+    for part in (looking, *looking.around):
+        T_part_seen = invert(part.T_odom_cam) @ looking.T_odom_cam @ T_looking_seen
+        blocked |= sight_of(seen, part.cloud, part.intrinsics, T_part_seen).blocked
+    blocked &= ~near
+    return float(blocked.sum() / max(blocked.sum() + near.sum(), 1))
