@@ -37,6 +37,7 @@ DETECTORS: dict[str, str] = {
     "semantic": "semslam.loop.detectors.semantic.detector:SemanticDetector",
     "semantic-paper": "semslam.loop.detectors.semantic.detector:PaperSemanticDetector",
     "fused": "semslam.loop.detectors.fused.detector:FusedDetector",
+    "objects": "semslam.loop.detectors.objects.detector:ObjectsDetector",
     "dbow": "semslam.loop.detectors.bag_of_words.detector:DbowDetector",
     "sda": "semslam.loop.detectors.sda.detector:SdaDetector",
     "cnnw": "semslam.loop.detectors.global_descriptor.cnnw:CnnwDetector",

@@ -1,0 +1,1 @@
+"""Loops between submaps of objects and structure."""

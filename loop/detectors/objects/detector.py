@@ -1,0 +1,157 @@
+"""Loops between object submaps: places known again from another side, in other light, after things were moved."""
+
+from collections import deque
+from typing import Self
+
+import numpy as np
+
+from semslam.config import Config, LoopConfig
+from semslam.errors import ConfigError
+from semslam.geometry.se3 import invert, transform_points
+from semslam.loop.detectors.common.backbone import Backbone
+from semslam.loop.detectors.common.growing import GrowingArray
+from semslam.loop.detectors.common.memo import LastView
+from semslam.loop.detectors.common.timeline import Timeline
+from semslam.loop.detectors.objects.labelled import GROUP_COUNT, GROUP_LIST, LabelledCloud, label_cloud
+from semslam.loop.detectors.objects.matching import SubmapMatch, match_submaps
+from semslam.loop.detectors.objects.settings import ObjectsConfig
+from semslam.loop.detectors.objects.submap import Submap, build_submap
+from semslam.types import (
+    Float32Array,
+    FloatArray,
+    Keyframe,
+    KeyframeView,
+    LoopCandidate,
+    LoopEvidence,
+    ObjectPair,
+    SubmapGuess,
+)
+
+LOOK_CHANNELS, LOOK_DIMENSIONS = 96, 24
+"""The encoder's middle features, and how many random directions of them are kept."""
+
+
+class ObjectsDetector:
+    """Submaps of objects and walls, matched by class, look and place.
+
+    The clouds of the keyframes of the last few metres are laid together in odometry's frame, their classes are counted
+    in voxels, and connected voxels of one group of classes become objects; vertical planes become walls. Up is known
+    from the floor, so two submaps differ by a turn and a shift. Earlier submaps that hold alike amounts of each group
+    are matched object by object and wall by wall; the share that agrees on one pose is the score, and the pose is the
+    candidate's guess, from which the verification registers both submaps' clouds.
+    """
+
+    name = "objects"
+    needs_labels = True
+    Settings = ObjectsConfig
+
+    def __init__(self, backbone: Backbone, config: ObjectsConfig, loops: LoopConfig) -> None:
+        self._backbone, self._config, self._loops = backbone, config, loops
+        self._timeline = Timeline(loops, config.min_score)
+        self._recent: deque[LabelledCloud] = deque()
+        self._submaps: list[Submap] = []
+        self._contents = GrowingArray(np.float32, (3 * GROUP_COUNT,))
+        rng = np.random.default_rng(0)
+        self._directions = np.linalg.qr(rng.normal(size=(LOOK_CHANNELS, LOOK_DIMENSIONS)))[0].astype(np.float32)
+        self._described = LastView(self._describe)
+
+    @classmethod
+    def from_config(cls, config: Config) -> Self:
+        """Take the sections ``objects``, ``loops`` and ``segmentation`` (for the network).
+
+        Raises:
+            ModelError: weights are missing or damaged.
+        """
+        return cls(Backbone.from_config(config), config.section(cls.name, cls.Settings), config.loops)
+
+    def query(self, view: KeyframeView) -> list[LoopCandidate]:
+        """Candidates by the share of objects and walls that agree, with the pose they agree on.
+
+        Raises:
+            ConfigError: the view holds no labels.
+        """
+        if not len(self._timeline):
+            return []
+        submap = self._described(view)[1]
+        matches = {at: match_submaps(submap, self._submaps[at], self._config) for at in self._shortlist(view, submap)}
+        scores = np.zeros(len(self._timeline))
+        for at, found in matches.items():
+            scores[at] = 0.0 if found is None else found.score
+        candidates = []
+        for at in self._timeline.best(view.keyframe, scores):
+            found = matches[at]
+            assert found is not None
+            candidates.append(self._candidate(view, submap, self._submaps[at], found))
+        return candidates
+
+    def add(self, view: KeyframeView) -> None:
+        """Remember the view's submap."""
+        cloud, submap = self._described(view)
+        self._recent = deque([*self._window(view.keyframe, cloud.travelled), cloud])
+        self._submaps.append(submap)
+        self._contents.append(submap.content[None])
+        self._timeline.add(view.keyframe)
+
+    def _describe(self, view: KeyframeView) -> tuple[LabelledCloud, Submap]:
+        if view.labels is None:
+            raise ConfigError(f"The detector '{self.name}' needs a segmentation, and none came with the keyframe.")
+        travelled = 0.0
+        if self._recent:
+            last = self._recent[-1]
+            travelled = last.travelled + float(
+                np.linalg.norm(view.keyframe.T_odom_cam[:3, 3] - last.keyframe.T_odom_cam[:3, 3])
+            )
+        middle = self._backbone.encode(view.color).middle
+        looks: Float32Array = middle.reshape(-1, LOOK_CHANNELS) @ self._directions
+        cloud = label_cloud(view, looks, middle.shape[:2], self._config.max_depth, travelled)
+        window = [*self._window(view.keyframe, travelled), cloud]
+        return cloud, build_submap(window, self._config)
+
+    def _window(self, keyframe: Keyframe, travelled: float) -> list[LabelledCloud]:
+        """Recent clouds that belong to the submap of a new keyframe."""
+        config = self._config
+        return [
+            cloud
+            for cloud in list(self._recent)[-(config.max_keyframes - 1) :]
+            if cloud.keyframe.map_id == keyframe.map_id
+            and travelled - cloud.travelled <= config.reach
+            and keyframe.timestamp - cloud.keyframe.timestamp <= config.max_age
+        ]
+
+    def _shortlist(self, view: KeyframeView, submap: Submap) -> list[int]:
+        """Positions of earlier submaps, without a keyframe in common, that hold alike amounts of each group."""
+        alike = self._contents.rows @ submap.content
+        stamps = self._timeline.stamps
+        old = (view.keyframe.timestamp - stamps >= self._loops.min_gap) & (stamps < submap.start)
+        chosen: list[int] = []
+        for at in np.argsort(-np.where(old, alike, -1.0), kind="stable").tolist():
+            if not old[at] or len(chosen) == self._config.shortlist:
+                break
+            if all(abs(stamps[at] - stamps[other]) >= self._config.spacing for other in chosen):
+                chosen.append(at)
+        return chosen
+
+    def _candidate(self, view: KeyframeView, query: Submap, match: Submap, found: SubmapMatch) -> LoopCandidate:
+        T = match.T_cam_level @ found.T_match_query @ invert(query.T_cam_level)
+        guess = SubmapGuess(tuple(map(tuple, T.tolist())), query.keyframes, match.keyframes)
+        objects = tuple(
+            ObjectPair(
+                _group_name(int(query.objects.groups[i])),
+                _place(query.T_cam_level, query.objects.centroids[i]),
+                _place(match.T_cam_level, match.objects.centroids[j]),
+            )
+            for i, j in found.objects
+        )
+        figures = {"matched_objects": float(len(found.objects)), "matched_walls": float(len(found.walls))}
+        labels = tuple(sorted({pair.label for pair in objects}))
+        evidence = LoopEvidence(labels, figures=figures, objects=objects)
+        return LoopCandidate(query.anchor, match.anchor, found.score, self.name, evidence, guess)
+
+
+def _group_name(group: int) -> str:
+    return GROUP_LIST[group] if group < len(GROUP_LIST) else f"class {group}"
+
+
+def _place(T_cam_level: FloatArray, centroid: Float32Array) -> tuple[float, float, float]:
+    x, y, z = transform_points(T_cam_level, centroid[None].astype(np.float64))[0].tolist()
+    return x, y, z

@@ -1,0 +1,215 @@
+"""A submap: the objects and walls that the last few metres saw, in a level frame at the newest camera."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from semslam.geometry.se3 import Float32Array, FloatArray, invert, transform_points
+from semslam.geometry.voxels import VoxelTable, voxel_cells
+from semslam.loop.detectors.objects.labelled import FIRST_THING, FLOOR, GROUP_COUNT, VOID, LabelledCloud
+from semslam.loop.detectors.objects.settings import ObjectsConfig
+from semslam.loop.detectors.objects.upright import find_up, level_frame
+from semslam.loop.detectors.objects.walls import Walls, azimuths, find_walls
+from semslam.types import IntArray, UInt8Array
+
+Int8Array = npt.NDArray[np.int8]
+HEIGHTS = (0.6, 1.4)
+"""Metres above the floor between low, middle and high."""
+CAMERA_HEIGHT = 1.4
+"""Metres that the camera is taken to be above a floor that was not seen."""
+LEVEL = 0.9
+"""Least vertical component of a level surface's normal."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Objects:
+    """Things in a submap, the largest first.
+
+    Attributes:
+        centroids: (K, 3) float32 metres in the level frame.
+        extents: (K, 2) float32 metres, horizontal and vertical.
+        sizes: (K,) float32 number of voxels.
+        groups: (K,) uint8, the group that most voted for.
+        classes: (K, G) int8 share of the votes of each group, 127 times a vector of length 1.
+        looks: (K, D) int8 features, likewise.
+    """
+
+    centroids: Float32Array
+    extents: Float32Array
+    sizes: Float32Array
+    groups: UInt8Array
+    classes: Int8Array
+    looks: Int8Array
+
+    def __len__(self) -> int:
+        return len(self.sizes)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Submap:
+    """What is kept of the surroundings of a keyframe.
+
+    Attributes:
+        anchor: id of the keyframe.
+        keyframes: ids of all keyframes in it, the anchor the last.
+        start: time stamp of the oldest, seconds.
+        T_cam_level: (4, 4) pose of the level frame in the anchor's camera.
+        floor: height of the floor in the level frame, metres; NaN where none was seen.
+        objects: things.
+        walls: vertical planes.
+        azimuths: (G, B) int8 directions of vertical surfaces by group, the largest 127.
+        content: (3 G,) float32 how much there is of each group, low, at middle height and high; of length 1.
+    """
+
+    anchor: int
+    keyframes: tuple[int, ...]
+    start: float
+    T_cam_level: FloatArray
+    floor: float
+    objects: Objects
+    walls: Walls
+    azimuths: Int8Array
+    content: Float32Array
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of its arrays."""
+        things, walls = self.objects, self.walls
+        arrays = (
+            things.centroids, things.extents, things.sizes, things.groups, things.classes, things.looks,
+            walls.azimuths, walls.offsets, walls.starts, walls.ends, walls.areas, self.azimuths, self.T_cam_level,
+            self.content,
+        )  # fmt: skip
+        return sum(array.nbytes for array in arrays) + 8 * len(self.keyframes)
+
+
+def build_submap(clouds: Sequence[LabelledCloud], config: ObjectsConfig) -> Submap:
+    """Fuse the labelled clouds of a few keyframes, the newest one the last.
+
+    Args:
+        clouds: in one odometry frame.
+        config: sizes and limits.
+    """
+    newest = clouds[-1].keyframe
+    T_odom_level = level_frame(newest.T_odom_cam, find_up(clouds))
+    T_level_odom = invert(T_odom_level)
+    points = transform_points(T_level_odom, np.concatenate([cloud.points for cloud in clouds])).astype(np.float32)
+    normals = (np.concatenate([c.normals for c in clouds]) @ T_level_odom[:3, :3].T).astype(np.float32)
+    labels = np.concatenate([cloud.groups for cloud in clouds])
+    table = VoxelTable(config.voxel)
+    rows = table.rows(points)
+    votes = np.bincount(rows * GROUP_COUNT + labels, minlength=len(table) * GROUP_COUNT)
+    votes = votes.reshape(-1, GROUP_COUNT)
+    winners = np.where(votes[:, 1:].any(axis=1), votes[:, 1:].argmax(axis=1) + 1, VOID)
+    counts = np.bincount(rows, minlength=len(table))
+    centres = _sums(rows, points, len(table)) / np.maximum(counts, 1)[:, None]
+    facing = _unit_rows(_sums(rows, normals, len(table)))
+    floor = _floor(centres, facing, winners)
+    ground = -CAMERA_HEIGHT if np.isnan(floor) else floor
+    things = _objects(voxel_cells(table.keys), centres, winners, votes, rows, clouds, config)
+    return Submap(
+        newest.id,
+        tuple(cloud.keyframe.id for cloud in clouds),
+        clouds[0].keyframe.timestamp,
+        invert(newest.T_odom_cam) @ T_odom_level,
+        floor,
+        things,
+        find_walls(centres, facing, config),
+        azimuths(facing, winners, GROUP_COUNT),
+        _content(centres[:, 2] - ground, winners),
+    )
+
+
+def _floor(centres: FloatArray, facing: FloatArray, winners: IntArray) -> float:
+    """Height of the largest level surface among what is labelled floor, or else of the lowest large one; or NaN."""
+    level = facing[:, 2] > LEVEL
+    heights = centres[level & (winners == FLOOR), 2]
+    if len(heights) < 20:
+        heights = centres[level & (centres[:, 2] < -0.7), 2]
+    if len(heights) < 20:
+        return float("nan")
+    return float(np.median(heights))
+
+
+def _content(heights: FloatArray, winners: IntArray) -> Float32Array:
+    layer = np.digitize(heights, HEIGHTS)
+    counts = np.bincount(winners * 3 + layer, minlength=3 * GROUP_COUNT).astype(np.float32)
+    counts[3 * VOID : 3 * VOID + 3] = 0
+    roots = np.sqrt(counts)
+    return np.asarray(roots / max(float(np.linalg.norm(roots)), 1e-9), dtype=np.float32)
+
+
+def _objects(
+    cells: IntArray, centres: FloatArray, winners: IntArray, votes: IntArray, rows: IntArray,
+    clouds: Sequence[LabelledCloud], config: ObjectsConfig,
+) -> Objects:  # fmt: skip
+    """Connected voxels of one group."""
+    owners = _components(cells, winners)
+    sizes = np.bincount(owners[owners >= 0], minlength=1)
+    kept = np.flatnonzero(sizes >= config.min_voxels)
+    kept = kept[np.argsort(-sizes[kept], kind="stable")][: config.max_objects]
+    place = np.full(len(sizes) + 1, -1)
+    place[kept] = np.arange(len(kept))
+    owner = place[owners]  # owners of -1 read the last element, which is -1
+    count = len(kept)
+    members = [np.flatnonzero(owner == k) for k in range(count)]
+    spans = [np.ptp(centres[rows_of], axis=0) for rows_of in members]
+    classes = np.stack([votes[rows_of].sum(axis=0) for rows_of in members]) if count else np.zeros((0, votes.shape[1]))
+    return Objects(
+        np.array([centres[rows_of].mean(axis=0) for rows_of in members], dtype=np.float32).reshape(-1, 3),
+        np.array([(np.hypot(s[0], s[1]), s[2]) for s in spans], dtype=np.float32).reshape(-1, 2),
+        sizes[kept].astype(np.float32),
+        np.array([winners[rows_of[0]] for rows_of in members], dtype=np.uint8),
+        quantised(classes),
+        _looks(owner[rows], count, clouds),
+    )
+
+
+def _components(cells: IntArray, winners: IntArray) -> IntArray:
+    """The connected component (V,) of each voxel among those of its group that touch it; -1 for structure and void."""
+    from scipy import ndimage
+
+    owners = np.full(len(cells), -1, dtype=np.int64)
+    if not len(cells):
+        return owners
+    total = 0
+    for group in np.unique(winners[winners >= FIRST_THING]):
+        rows = np.flatnonzero(winners == group)
+        own = cells[rows] - cells[rows].min(axis=0)
+        grid = np.zeros(own.max(axis=0) + 1, dtype=bool)
+        grid[tuple(own.T)] = True
+        labels, found = ndimage.label(grid, structure=np.ones((3, 3, 3)))
+        owners[rows] = total + labels[tuple(own.T)] - 1
+        total += found
+    return owners
+
+
+def _looks(owner: IntArray, count: int, clouds: Sequence[LabelledCloud]) -> Int8Array:
+    """Mean features (K, D) of the image cells that show each object, over all keyframes; of length 1."""
+    dimensions = clouds[0].looks.shape[1]
+    total = np.zeros((count, dimensions))
+    begin = 0
+    for cloud in clouds:
+        own = owner[begin : begin + len(cloud.points)]
+        begin += len(cloud.points)
+        seen = np.flatnonzero(own >= 0)
+        shown = np.bincount(own[seen] * len(cloud.looks) + cloud.cells[seen], minlength=count * len(cloud.looks))
+        total += shown.reshape(count, len(cloud.looks)) @ cloud.looks
+    return quantised(total)
+
+
+def _sums(rows: IntArray, values: Float32Array, count: int) -> FloatArray:
+    """Sum (count, 3) of the values (N, 3) of each row."""
+    columns = [np.bincount(rows, values[:, k], count).astype(np.float64) for k in range(3)]
+    return np.stack(columns, axis=1)
+
+
+def quantised(rows: npt.NDArray[np.floating]) -> Int8Array:
+    """Rows (N, D) at length 127, rounded."""
+    return np.rint(127 * _unit_rows(rows)).astype(np.int8)
+
+
+def _unit_rows(rows: npt.NDArray[np.floating]) -> FloatArray:
+    return np.asarray(rows / np.maximum(np.linalg.norm(rows, axis=1, keepdims=True), 1e-9), dtype=np.float64)
