@@ -35,6 +35,7 @@ from semslam.geometry.se3 import invert, rotation_angle
 from semslam.loop.detector import LoopDetector
 from semslam.loop.segmentation.build import build_segmenter
 from semslam.loop.verification.icp import IcpVerifier
+from semslam.loop.verification.submaps import ends_of
 from semslam.studies.detectors import compare_detectors, exhaustive_detector, keyframe_views
 from semslam.types import Frame, KeyframeView, LoopConstraint, Transforms
 
@@ -161,7 +162,7 @@ def print_mixed(datasets: list[Dataset], names: list[str], every: int) -> None:
             keyframe = replace(view.keyframe, id=len(views), timestamp=stamp)
             views.append(replace(view, keyframe=keyframe))
             origin.append(number)
-    verifier = IcpVerifier.from_config(config)
+    verifier, keyframes = IcpVerifier.from_config(config), [view.keyframe for view in views]
     print(f"{', '.join(d.name for d in datasets)} in one database\n")
     print("| detector | proposed across | accepted across |\n|---|---|---|")
     for name in names:
@@ -171,7 +172,7 @@ def print_mixed(datasets: list[Dataset], names: list[str], every: int) -> None:
             for candidate in detector.query(view):
                 if origin[candidate.match] != origin[row]:
                     proposed += 1
-                    outcome = verifier.verify(view.keyframe, views[candidate.match].keyframe, candidate)
+                    outcome = verifier.verify(*ends_of(candidate, keyframes), candidate)
                     accepted += isinstance(outcome, LoopConstraint)
             detector.add(view)
         print(f"| {name} | {proposed} | {accepted} |", flush=True)
@@ -214,7 +215,7 @@ def print_verified(dataset: Dataset, names: list[str], every: int) -> None:
     stamps = [view.keyframe.timestamp for view in views]
     truth = find_loop_truth(stamps, [make_view(v.depth, v.keyframe.intrinsics) for v in views], dataset.ground_truth)
     poses, _ = poses_at(dataset.ground_truth, stamps)
-    verifier = IcpVerifier.from_config(config)
+    verifier, keyframes = IcpVerifier.from_config(config), [view.keyframe for view in views]
     print(f"{dataset.name}: after verification\n")
     print("| detector | proposed | accepted | pose off | wrong place | queries closed |")
     print("|---|---|---|---|---|---|")
@@ -224,7 +225,7 @@ def print_verified(dataset: Dataset, names: list[str], every: int) -> None:
         for row, view in enumerate(views):
             for candidate in detector.query(view):
                 proposed += 1
-                outcome = verifier.verify(view.keyframe, views[candidate.match].keyframe, candidate)
+                outcome = verifier.verify(*ends_of(candidate, keyframes), candidate)
                 if isinstance(outcome, LoopConstraint):
                     good = is_accurate(outcome, poses, row)
                     accepted, off, closed[row] = accepted + 1, off + (not good), closed[row] | good

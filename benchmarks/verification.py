@@ -30,6 +30,7 @@ from semslam.loop.detector import LoopDetector
 from semslam.loop.segmentation.build import build_segmenter
 from semslam.loop.verification.icp import IcpVerifier
 from semslam.loop.verification.registration import ICP_KINDS
+from semslam.loop.verification.submaps import ends_of
 from semslam.types import Keyframe, KeyframeView, LoopConstraint
 
 PAUSE = 1000.0
@@ -76,7 +77,7 @@ def run(path: str, every: int, config: Config, detector: LoopDetector, known: li
         known.append(view.keyframe)
         depths.append(make_view(view.depth, view.keyframe.intrinsics))
         before = time.process_time()
-        outcomes = [verifier.verify(view.keyframe, known[c.match], c) for c in candidates]
+        outcomes = [verifier.verify(*ends_of(c, known), c) for c in candidates]
         spent, tried = spent + time.process_time() - before, tried + len(outcomes)
         loops += [outcome for outcome in outcomes if isinstance(outcome, LoopConstraint)]
     stamps = np.array([keyframe.timestamp - start for keyframe in known[first:]])
@@ -124,7 +125,7 @@ def compare_kinds(part: Part, known: list[Keyframe], every: int) -> None:
     for candidate in pairs:
         for kind, verifier in verifiers.items():
             before = time.process_time()
-            loop = verifier.verify(known[candidate.query], known[candidate.match], candidate)
+            loop = verifier.verify(*ends_of(candidate, known), candidate)
             spent[kind].append(1e3 * (time.process_time() - before))
             if isinstance(loop, LoopConstraint):
                 E = error_of(part, loop)

@@ -10,7 +10,7 @@ from semslam.loop.following import LoopFollower
 from semslam.loop.memory import LoopMemory, without_content
 from semslam.loop.segmentation.build import build_segmenter
 from semslam.loop.segmentation.segmenter import Segmenter
-from semslam.loop.verification.submaps import with_submap
+from semslam.loop.verification.submaps import ends_of
 from semslam.loop.verification.verifier import LoopVerifier, build_verifier
 from semslam.plugins import load
 from semslam.runtime.stopwatch import Stopwatch
@@ -153,10 +153,7 @@ class LoopSearch:
         return KeyframeView(keyframe, frame.color, frame.depth, labels)
 
     def _verify(self, candidate: LoopCandidate) -> Verification:
-        query, match = self._keyframes[-1], self._keyframes[candidate.match]
-        if candidate.guess is not None:
-            query = with_submap(query, candidate.guess.query, self._keyframes)
-            match = with_submap(match, candidate.guess.match, self._keyframes)
+        query, match = ends_of(candidate, self._keyframes)
         with self._stopwatch.stage("verify"):
             outcome = self._verifier.verify(query, match, candidate)
         self._follower.note(outcome)

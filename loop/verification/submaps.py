@@ -14,8 +14,20 @@ from semslam.loop.verification.registration import Fit, measure_fit, plane_infor
 from semslam.types import Cloud, Keyframe, LoopCandidate, LoopConstraint, LoopRejection, RejectionReason, SubmapGuess
 
 
-def with_submap(keyframe: Keyframe, ids: Sequence[int], keyframes: Sequence[Keyframe]) -> Keyframe:
-    """The keyframe with the others of its submap around it; ``keyframes[i].id`` is i."""
+def ends_of(candidate: LoopCandidate, keyframes: Sequence[Keyframe]) -> tuple[Keyframe, Keyframe]:
+    """Query and match of a candidate, each with its submap around it where the candidate has a guess.
+
+    Args:
+        candidate: names both.
+        keyframes: all so far; ``keyframes[i].id`` is i.
+    """
+    query, match, guess = keyframes[candidate.query], keyframes[candidate.match], candidate.guess
+    if guess is None:
+        return query, match
+    return _with_submap(query, guess.query, keyframes), _with_submap(match, guess.match, keyframes)
+
+
+def _with_submap(keyframe: Keyframe, ids: Sequence[int], keyframes: Sequence[Keyframe]) -> Keyframe:
     return replace(keyframe, around=tuple(keyframes[i] for i in ids if i != keyframe.id))
 
 

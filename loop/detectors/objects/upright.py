@@ -20,8 +20,8 @@ def find_up(clouds: Sequence[LabelledCloud]) -> FloatArray:
     It begins with the median normal of the points that are labelled floor, or where there are few, with the mean of
     the cameras' upward axes: who holds a camera holds it roughly level. In ever narrower cones it then becomes the
     direction that normals of level surfaces (floors, tables, ceilings) lie along and those of upright ones (walls)
-    across: the smallest eigenvector of the sum of n n' over the upright less that over the level. Without any surface it
-    stays as it is.
+    across: the smallest eigenvector of the sum of n n' over the upright less that over the level. Without any surface
+    it stays as it is.
     """
     normals = np.concatenate([cloud.normals for cloud in clouds]).astype(np.float64)
     floor = np.concatenate([cloud.groups for cloud in clouds]) == FLOOR

@@ -8,7 +8,7 @@ import pytest
 from semslam.config import Config
 from semslam.geometry.se3 import FloatArray, exp_so3, invert, make_transform, rotation_angle
 from semslam.loop.verification.icp import IcpVerifier
-from semslam.loop.verification.submaps import merged_cloud, with_submap
+from semslam.loop.verification.submaps import ends_of, merged_cloud
 from semslam.testing.scenes import corner_view, empty
 from semslam.types import Keyframe, LoopCandidate, LoopConstraint, LoopRejection, ObjectPair, SubmapGuess
 from semslam.types.loops import LoopEvidence
@@ -30,11 +30,7 @@ def candidate(T_match_query: FloatArray) -> LoopCandidate:
 
 def verify(T_guess: FloatArray, views: list[Keyframe]) -> LoopConstraint | LoopRejection:
     proposed = candidate(T_guess)
-    assert proposed.guess is not None
-    query, match = (
-        with_submap(views[3], proposed.guess.query, views),
-        with_submap(views[1], proposed.guess.match, views),
-    )
+    query, match = ends_of(proposed, views)
     return IcpVerifier.from_config(Config()).verify(query, match, proposed)
 
 
@@ -66,7 +62,7 @@ def test_a_submap_without_points_is_rejected() -> None:
 
 def test_clouds_are_merged_in_the_anchor() -> None:
     views = keyframes()
-    alone, merged = merged_cloud(views[3], 0.05), merged_cloud(with_submap(views[3], (2, 3), views), 0.05)
+    alone, merged = merged_cloud(views[3], 0.05), merged_cloud(ends_of(candidate(np.eye(4)), views)[0], 0.05)
     assert len(merged) > len(alone)
     assert np.linalg.norm(merged.normals, axis=1) == pytest.approx(1, abs=1e-5)
     # All of it lies on the three planes of the corner.
