@@ -1,6 +1,6 @@
 """Loops where appearance fails: places seen again from another side, in other light, after things were moved.
 
-    python benchmarks/hard_loops.py "synthetic:house?way=back&rate=5" --every 3 [--detectors objects,fused,dbow] [--labels]
+    python benchmarks/hard_loops.py "synthetic:house?way=back&rate=5" --every 3 [--detectors objects,fused] [--labels]
 
 Frames are tracked by the default odometry. A revisit is a keyframe whose place, one room with a common surface of the
 surroundings, was seen at least 15 s before (``semslam.eval.loops.places``); its kind is the least angle between its
