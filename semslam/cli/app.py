@@ -9,7 +9,20 @@ from typing import TextIO
 import typer
 
 from semslam import __version__
-from semslam.cli import checks, environment, exports, graphs, maps, merging, models, pictures, runs, scores, sweeps
+from semslam.cli import (
+    checks,
+    environment,
+    exports,
+    graphs,
+    maps,
+    merging,
+    models,
+    pictures,
+    runs,
+    scores,
+    sensors,
+    sweeps,
+)
 from semslam.cli.console import complain, remark
 from semslam.errors import SemslamError, SemslamWarning
 
@@ -39,7 +52,8 @@ def root(
     """RGB-D SLAM whose loop closures come from semantics."""
 
 
-for module in (runs, sweeps, checks, pictures, scores, exports, maps, merging, graphs, models, environment):
+MODULES = (runs, sweeps, checks, pictures, scores, exports, maps, merging, graphs, models, sensors, environment)
+for module in MODULES:
     for command in module.COMMANDS:
         app.command(command.name, help=command.help, epilog=command.epilog)(command.run)
 

@@ -14,7 +14,8 @@ from semslam.geometry.camera import COEFFICIENTS, NO_DISTORTION, Intrinsics
 
 CAMERA_FILE = "camera.yaml"
 _REQUIRED = ("width", "height", "fx", "fy", "cx", "cy")
-_OPTIONAL = ("distortion", "depth_scale", "readout")
+_TIMES = ("readout", "delay", "depth_readout")
+_OPTIONAL = ("distortion", "depth_scale", *_TIMES)
 MAX_FILE_BYTES = 1_000_000
 MAX_NUMBER = 1e9
 """No size, focal length or depth scale comes near to it."""
@@ -46,7 +47,7 @@ class CameraSetup:
 
 def read_camera(path: Path) -> CameraSetup:
     """Read a camera.yaml: width height fx fy cx cy; optionally distortion (k1 k2 p1 p2 k3, or k4 k5 k6 as well),
-    depth_scale, readout.
+    depth_scale and times: ``readout``, ``delay`` and ``depth_readout`` as in ``Intrinsics``, seconds.
 
     A negative fy is read as in ICL-NUIM: the images are upright all the same, so the camera gets its size, and
     ``y_up`` states that the poses are mirrored.
@@ -66,29 +67,29 @@ def read_camera(path: Path) -> CameraSetup:
     if depth_scale is not None and depth_scale <= 0:
         raise DatasetError(f"The camera file {path} gives a depth_scale that is not positive: {depth_scale}.")
     distortion = _distortion(values.get("distortion"), path)
-    readout = _number(values, "readout", path) if "readout" in values else None
+    times = {key: _number(values, key, path) for key in _TIMES if key in values}
     try:
-        intrinsics = Intrinsics(int(width), int(height), fx, abs(fy), cx, cy, distortion, readout)
+        intrinsics = Intrinsics(int(width), int(height), fx, abs(fy), cx, cy, distortion, **times)
     except ConfigError as error:
         raise DatasetError(f"The camera file {path}: {error}") from error
     return CameraSetup(intrinsics, depth_scale, y_up=fy < 0, scale_stated=depth_scale is not None)
 
 
-def write_camera(path: Path, intrinsics: Intrinsics, depth_scale: float) -> None:
+def write_camera(path: Path, intrinsics: Intrinsics, depth_scale: float | None) -> None:
     """Write a camera.yaml that ``read_camera`` understands.
 
     Args:
         path: the file.
         intrinsics: the camera.
-        depth_scale: units of the depth images per metre.
+        depth_scale: units of the depth images per metre; None = not stated.
 
     Raises:
         DatasetError: the file cannot be written.
     """
     values = {key: getattr(intrinsics, key) for key in _REQUIRED}
-    values |= {"distortion": list(intrinsics.distortion), "depth_scale": depth_scale}
-    if intrinsics.readout is not None:
-        values["readout"] = intrinsics.readout
+    values["distortion"] = list(intrinsics.distortion)
+    values |= {} if depth_scale is None else {"depth_scale": depth_scale}
+    values |= {key: getattr(intrinsics, key) for key in _TIMES if getattr(intrinsics, key) is not None}
     try:
         path.write_text(yaml.safe_dump(values, sort_keys=False, default_flow_style=None), encoding="utf-8")
     except OSError as error:

@@ -40,9 +40,11 @@ class Intrinsics:
             (OpenCV's order).
         readout: seconds from the exposure of the first row to that of the last (rolling shutter); 0 = all rows at
             once, None = not known.
+        delay: seconds by which depth is taken after colour, both at the principal point's row.
+        depth_readout: seconds from the measurement of depth's first row to that of the last.
 
     Raises:
-        ConfigError: a size or focal length is not positive, the read-out is negative, or a value is not finite or
+        ConfigError: a size or focal length is not positive, a read-out is negative, or a value is not finite or
             so far off that no camera has it.
     """
 
@@ -54,15 +56,18 @@ class Intrinsics:
     cy: float
     distortion: tuple[float, ...] = NO_DISTORTION
     readout: float | None = None
+    delay: float = 0.0
+    depth_readout: float = 0.0
 
     def __post_init__(self) -> None:
         readout = 0.0 if self.readout is None else self.readout
-        values = (self.width, self.height, self.fx, self.fy, self.cx, self.cy, readout, *self.distortion)
+        timing = (readout, self.delay, self.depth_readout)
+        values = (self.width, self.height, self.fx, self.fy, self.cx, self.cy, *timing, *self.distortion)
         numeric = all(isinstance(value, int | float | np.number) for value in values)
         if len(self.distortion) not in COEFFICIENTS or not numeric:
             raise ConfigError(f"These camera intrinsics are not usable: {self}.")
-        numbers = (self.fx, self.fy, self.cx, self.cy, *self.distortion, readout)
-        positive = min(self.width, self.height, self.fx, self.fy) > 0 and readout >= 0
+        numbers = (self.fx, self.fy, self.cx, self.cy, *self.distortion, *timing)
+        positive = min(self.width, self.height, self.fx, self.fy) > 0 and min(readout, self.depth_readout) >= 0
         if not np.isfinite(numbers).all() or not positive:
             raise ConfigError(f"These camera intrinsics are not usable: {self}.")
         side = max(self.width, self.height)
@@ -71,7 +76,8 @@ class Intrinsics:
             "focal length": not all(MIN_FOCAL * side <= f <= MAX_FOCAL * side for f in (self.fx, self.fy)),
             "principal point": max(abs(self.cx), abs(self.cy)) > MAX_OFFSET * side,
             "distortion": max(map(abs, self.distortion)) > MAX_DISTORTION,
-            "read-out": readout > MAX_READOUT,
+            "read-out": max(readout, self.depth_readout) > MAX_READOUT,
+            "delay": abs(self.delay) > MAX_READOUT,
         }
         for what, far_off in absurd.items():
             if far_off:
@@ -131,7 +137,8 @@ class Intrinsics:
         """The camera of the same image resized by ``factor``, pixel centres at whole numbers."""
         return Intrinsics(
             round(self.width * factor), round(self.height * factor), self.fx * factor, self.fy * factor,
-            (self.cx + 0.5) * factor - 0.5, (self.cy + 0.5) * factor - 0.5, self.distortion, self.readout,
+            (self.cx + 0.5) * factor - 0.5, (self.cy + 0.5) * factor - 0.5, self.distortion, self.readout, self.delay,
+            self.depth_readout,
         )  # fmt: skip
 
 

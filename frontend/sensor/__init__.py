@@ -1,0 +1,1 @@
+"""The sensor's timing, estimated from a recording."""
