@@ -43,7 +43,7 @@ class WallDataset:
     unreadable: tuple[int, ...] = ()
     interrupt_at: int | None = None
     name: str = "wall"
-    intrinsics: Intrinsics = field(default=Intrinsics(320, 240, 260.0, 260.0, 159.5, 119.5))
+    intrinsics: Intrinsics = field(default=Intrinsics(320, 240, 260.0, 260.0, 159.5, 119.5, readout=0.0))
     depth: float = 1.5
     step: int = 4
 

@@ -46,7 +46,7 @@ class FeatureMapOdometry:
         self._map = LocalMap(config.keypoints.count, self._scale)
         self._mapper = Mapper(self._map, own)
         self._prediction = ConstantVelocity()
-        self._readout = ReadoutEstimate(own.readout, own.readout_sigma)
+        self._readout = ReadoutEstimate(own.readout or 0.0, own.readout_sigma)
         self._reference: MapKeyframe | None = None
         self._T_ref_prev: FloatArray = np.eye(4)
         self._T_reported: FloatArray = np.eye(4)
@@ -85,7 +85,8 @@ class FeatureMapOdometry:
         if not self._started:
             self._started = True
             if self._config.readout is None:
-                self._readout = ReadoutEstimate(frame.intrinsics.readout, self._config.readout_sigma)
+                # Not known: a global shutter, since a read-out that is not there costs more than one that is missed.
+                self._readout = ReadoutEstimate(frame.intrinsics.readout or 0.0, self._config.readout_sigma)
             self._prediction.tracked(frame.timestamp, np.eye(4))
             self._start_map(self._view(frame, raw, np.zeros(6)))
             return first_motion()

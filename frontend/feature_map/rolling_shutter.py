@@ -15,8 +15,6 @@ from semslam.types import Features, FloatArray, Intrinsics, Points3, Transform
 
 FASTEST = 0.04
 """Seconds; no read-out is longer than a frame at 25 Hz."""
-USUAL = 0.026
-"""Seconds; a Kinect's, where the camera states none."""
 FORGET = 0.97
 """Factor by which a frame's information in the estimate decays at each further frame."""
 
@@ -60,12 +58,12 @@ class ReadoutEstimate:
     """The read-out time, from how residuals grow with a row's delay and the camera's velocity.
 
     Args:
-        seconds: the prior; 0 = all rows at once, which is not estimated; None = not known.
+        seconds: the prior; 0 = all rows at once, which is not estimated.
         sigma: standard deviation of the prior, seconds; 0 = exact.
     """
 
-    def __init__(self, seconds: float | None, sigma: float) -> None:
-        self._prior = USUAL if seconds is None else seconds
+    def __init__(self, seconds: float, sigma: float) -> None:
+        self._prior = seconds
         self._prior_weight = 1.0 / sigma**2 if sigma > 0 and self._prior > 0 else np.inf
         self._weight = 0.0
         self._sum = 0.0

@@ -14,7 +14,9 @@ class FeatureMapConfig(Section):
     restart_seconds: float = setting(
         0.5, "time without tracking, on usable images, after which a new map starts", unit="s", ge=0
     )
-    readout: float | None = setting(None, "read-out time of the rolling shutter; none = the camera's", unit="s", ge=0)
+    readout: float | None = setting(
+        None, "read-out time of the rolling shutter; none = the camera's, or else estimated", unit="s", ge=0
+    )
     readout_sigma: float = setting(
         0.005, "standard deviation of the read-out time before it is estimated; 0 = known", unit="s", ge=0
     )

@@ -23,6 +23,8 @@ ENOUGH = 3
 """Stretches below which nothing is determined: their scatter is what the uncertainty rests on."""
 PRIOR = np.array([0.05, 0.05, 0.05, 1.0, 1.0, 0.5])
 """Standard deviations around zero of what is estimated, see ``PARAMETERS``; wide, but for depth against colour."""
+FARTHEST = np.array([0.1, 0.1, 0.1, 10.0, 10.0, 5.0])
+"""How far from zero they may get on the way."""
 STEPS, RELAXATION, SETTLED = 14, 1.3, 2e-5
 """Steps at most, the factor on each, and the seconds below which steps end."""
 SPREAD = 2.0
@@ -53,7 +55,10 @@ def calibrate(
                 break
         if len(found) < ENOUGH:
             return SensorEstimate(stretches=len(found))
-        readout, delay, depth_readout = _solve(found)
+        try:
+            readout, delay, depth_readout = _solve(found)
+        except np.linalg.LinAlgError:  # the stretches do not fix their poses, as on a flat wall
+            return SensorEstimate(stretches=len(found))
         factor = UNKNOWN_FACTOR if ground_truth is None else depth_factor(found, ground_truth)
         return SensorEstimate(readout, delay, depth_readout, factor, len(found))
 
@@ -88,7 +93,7 @@ def _solve(stretches: Sequence[Stretch]) -> list[Estimate]:
         H = sum((e.H for e in equations), np.diag(information))
         gradient = sum((e.g for e in equations), -values * information)
         step = np.asarray(RELAXATION * np.linalg.solve(H, gradient), dtype=np.float64)
-        values = values + step
+        values = np.clip(values + step, -FARTHEST, FARTHEST)
         for stretch in stretches:
             stretch.substitute(step)
         if np.abs(step[:3]).max() < SETTLED:

@@ -69,6 +69,30 @@ class RealTimeMetrics(_Record):
     lag_ms: Latency
 
 
+class TimingMetrics(_Record):
+    """An estimated time, its standard deviation, and whether the sequence determines it."""
+
+    ms: float
+    sigma_ms: float
+    determined: bool
+
+
+class SensorMetrics(_Record):
+    """What the first seconds state of a camera that is not known.
+
+    Attributes:
+        readout: from colour's first row to its last.
+        delay: from colour to depth.
+        depth_readout: from depth's first row to its last.
+        used_readout_ms: what the odometry began with: none where it is not determined.
+    """
+
+    readout: TimingMetrics
+    delay: TimingMetrics
+    depth_readout: TimingMetrics
+    used_readout_ms: float
+
+
 class Metrics(_Record):
     """All figures of one run.
 
@@ -93,6 +117,7 @@ class Metrics(_Record):
         interrupted: whether the run was stopped before the last frame.
         error: what stopped it, where that was an error.
         realtime: of a run in real time; None of all others, which give the same result each time.
+        sensor: what was estimated of a camera that states no read-out; None of all others.
     """
 
     sequence: str
@@ -115,3 +140,4 @@ class Metrics(_Record):
     interrupted: bool = False
     error: str | None = None
     realtime: RealTimeMetrics | None = None
+    sensor: SensorMetrics | None = None

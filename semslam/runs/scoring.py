@@ -14,7 +14,7 @@ from semslam.eval.metrics import TrajectoryMetrics
 from semslam.eval.trajectory import coverage, score_trajectory
 from semslam.runs.contributions import loop_contributions
 from semslam.runs.ledger import rejected_entry, verified_entry
-from semslam.runs.metrics import LoopMetrics, Metrics, RealTimeMetrics, TimeMetrics
+from semslam.runs.metrics import LoopMetrics, Metrics, RealTimeMetrics, SensorMetrics, TimeMetrics
 from semslam.system.result import FrameState, SlamResult
 from semslam.types import (
     JudgedLoop,
@@ -55,6 +55,7 @@ def score_run(
     interrupted: bool = False,
     error: str | None = None,
     realtime: RealTimeMetrics | None = None,
+    sensor: SensorMetrics | None = None,
 ) -> Scores:
     """Score a run; without ground truth, or where it meets fewer than three poses, the errors are None."""
     truth = dataset.ground_truth
@@ -82,6 +83,7 @@ def score_run(
         interrupted=interrupted,
         error=error,
         realtime=realtime,
+        sensor=sensor,
     )
     return Scores(odometry, live, trajectory, ledger, metrics)
 

@@ -16,11 +16,12 @@ from semslam.maps.cloud import join_clouds
 from semslam.runs.clock import RunClock
 from semslam.runs.journal import Journal, JournalError
 from semslam.runs.latency import Latencies
-from semslam.runs.metrics import Metrics
+from semslam.runs.metrics import Metrics, SensorMetrics
 from semslam.runs.realtime import measure_realtime, realtime_notes
 from semslam.runs.recording import RecordedFrame, Recording, checksum
 from semslam.runs.result import PartialRunError, RunResult
 from semslam.runs.scoring import Scores, score_run
+from semslam.runs.sensor import CalibratedSequence, needs_timing
 from semslam.runtime.stopping import Stop
 from semslam.runtime.stopwatch import Stopwatch
 from semslam.runtime.workers import WorkerKind
@@ -57,6 +58,7 @@ class Session:
             self._slam = Slam.from_config(config, self._stopwatch, verifier, worker, self._show_answer, realtime)
         except Exception as error:  # what a part from outside raises when it is built
             raise as_our_own(error) from error
+        self._sensor: SensorMetrics | None = None
         self._unreadable: list[str] = []
         self._checksum = 0
         self._interrupted = False
@@ -67,6 +69,7 @@ class Session:
     def track(self) -> Iterator[tuple[int, FrameState | None]]:
         """Read and track every frame."""
         self._looks = True
+        self._know_sensor()
         if self._feed is not None:
             self._slam.wait_until_ready()
         for index, item, came in self._frames():
@@ -80,6 +83,13 @@ class Session:
                 self._latencies.done(state.keyframe)
                 self._show(state, item)
                 yield index, state
+
+    def _know_sensor(self) -> None:
+        """Estimate the times of a camera that states none; frames that come by themselves cannot be read ahead."""
+        if self._feed is None and needs_timing(self._dataset, self._config):
+            with self._stopwatch.stage("calibration"):
+                calibrated = CalibratedSequence(self._dataset)
+            self._dataset, self._sensor = calibrated, calibrated.metrics
 
     def _frames(self) -> Iterator[tuple[int, Frame | DatasetError, float | None]]:
         """Each frame with its place and, where it comes by itself, the moment at which it came."""
@@ -182,7 +192,9 @@ class Session:
         unreadable = len(self._unreadable)
         lag = self._latencies.lag_ms
         realtime = None if self._feed is None or lag is None else measure_realtime(self._feed, slam, lag)
-        scores = score_run(self._dataset, self._config, slam, unreadable, times, self._interrupted, error, realtime)
+        scores = score_run(
+            self._dataset, self._config, slam, unreadable, times, self._interrupted, error, realtime, self._sensor
+        )
         profile = self._clock.profile(times.wall_s, self._stopwatch, self._latencies)
         self._viewer.finish(partial(_shown_at_the_end, slam, scores, self._dataset.ground_truth))
         return RunResult(

@@ -96,10 +96,15 @@ def test_known_readout_is_kept(believed: float, sigma: float) -> None:
     assert estimate.seconds == believed
 
 
-def test_the_setting_wins_over_the_camera_and_the_camera_over_the_usual() -> None:
-    camera = replace(CAMERA, readout=0.0)
+def test_the_setting_wins_over_the_camera_and_one_that_states_nothing_has_a_global_shutter() -> None:
+    camera = replace(CAMERA, readout=0.02)
     black = np.zeros((480, 640, 3), dtype=np.uint8)
-    for setting, seen_by, wanted in ((None, camera, 0.0), (None, CAMERA, 0.026), (0.01, camera, 0.01)):
+    for setting, seen_by, wanted in (
+        (None, camera, 0.02),
+        (None, CAMERA, 0.0),
+        (0.01, camera, 0.01),
+        (0.0, camera, 0.0),
+    ):
         odometry = FeatureMapOdometry(Config(feature_map=FeatureMapConfig(readout=setting)))
         odometry.track(Frame(0, 0.0, black, np.zeros((480, 640), dtype=np.float32), seen_by))
         assert odometry.readout_seconds == wanted
