@@ -7,6 +7,7 @@ import numpy as np
 from semslam.config import Config
 from semslam.features import FeatureExtractor
 from semslam.frontend.feature_map.bridge import Bridge, NoBridge
+from semslam.frontend.feature_map.depth_instant import at_color
 from semslam.frontend.feature_map.landmarks import NONE
 from semslam.frontend.feature_map.local_map import LocalMap, MapKeyframe
 from semslam.frontend.feature_map.map_pose import Located, View, locate
@@ -42,7 +43,8 @@ class FeatureMapOdometry:
         # Fewer and wider levels than the verification's: cheaper, and landmarks are placed better.
         self._scale = own.scale
         pyramid = {"levels": own.levels, "scale": own.scale}
-        self._extractor = FeatureExtractor(config.keypoints.model_copy(update=pyramid))
+        self._keypoints = config.keypoints.model_copy(update=pyramid)
+        self._extractor = FeatureExtractor(self._keypoints)
         self._map = LocalMap(config.keypoints.count, self._scale)
         self._mapper = Mapper(self._map, own)
         self._prediction = ConstantVelocity()
@@ -105,7 +107,8 @@ class FeatureMapOdometry:
         return self._accept(view, raw, found, T_map_prev)
 
     def _view(self, frame: Frame, raw: Features, velocity: FloatArray) -> View:
-        features = rectify(raw, frame.intrinsics, velocity, self._readout.seconds)
+        timed = at_color(raw, frame, velocity, self._readout.seconds, self._keypoints)
+        features = rectify(timed, frame.intrinsics, velocity, self._readout.seconds)
         sigmas = self._scale ** features.octaves.astype(np.float64)
         measured = measure(features.pixels, features.depths, sigmas)
         return View(frame.timestamp, features, measured, frame.intrinsics, velocity)

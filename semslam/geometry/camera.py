@@ -41,7 +41,7 @@ class Intrinsics:
         readout: seconds from the exposure of the first row to that of the last (rolling shutter); 0 = all rows at
             once, None = not known.
         delay: seconds by which depth is taken after colour, both at the principal point's row.
-        depth_readout: seconds from the measurement of depth's first row to that of the last.
+        depth_readout: seconds from the measurement of depth's first row to that of the last; None = as colour's.
 
     Raises:
         ConfigError: a size or focal length is not positive, a read-out is negative, or a value is not finite or
@@ -57,17 +57,17 @@ class Intrinsics:
     distortion: tuple[float, ...] = NO_DISTORTION
     readout: float | None = None
     delay: float = 0.0
-    depth_readout: float = 0.0
+    depth_readout: float | None = None
 
     def __post_init__(self) -> None:
-        readout = 0.0 if self.readout is None else self.readout
-        timing = (readout, self.delay, self.depth_readout)
+        readout, depth_readout = self.readout or 0.0, self.depth_readout or 0.0
+        timing = (readout, self.delay, depth_readout)
         values = (self.width, self.height, self.fx, self.fy, self.cx, self.cy, *timing, *self.distortion)
         numeric = all(isinstance(value, int | float | np.number) for value in values)
         if len(self.distortion) not in COEFFICIENTS or not numeric:
             raise ConfigError(f"These camera intrinsics are not usable: {self}.")
         numbers = (self.fx, self.fy, self.cx, self.cy, *self.distortion, *timing)
-        positive = min(self.width, self.height, self.fx, self.fy) > 0 and min(readout, self.depth_readout) >= 0
+        positive = min(self.width, self.height, self.fx, self.fy) > 0 and min(readout, depth_readout) >= 0
         if not np.isfinite(numbers).all() or not positive:
             raise ConfigError(f"These camera intrinsics are not usable: {self}.")
         side = max(self.width, self.height)
@@ -76,7 +76,7 @@ class Intrinsics:
             "focal length": not all(MIN_FOCAL * side <= f <= MAX_FOCAL * side for f in (self.fx, self.fy)),
             "principal point": max(abs(self.cx), abs(self.cy)) > MAX_OFFSET * side,
             "distortion": max(map(abs, self.distortion)) > MAX_DISTORTION,
-            "read-out": max(readout, self.depth_readout) > MAX_READOUT,
+            "read-out": max(readout, depth_readout) > MAX_READOUT,
             "delay": abs(self.delay) > MAX_READOUT,
         }
         for what, far_off in absurd.items():
@@ -101,6 +101,15 @@ class Intrinsics:
         distortion = np.array(self.distortion)
         moved = cv2.undistortPoints(flat, self.matrix, distortion, P=self.matrix)
         return np.asarray(moved, dtype=np.float32).reshape(-1, 2)
+
+    def distort_pixels(self, pixels: npt.NDArray[np.floating]) -> FloatArray:
+        """Move pixels (N, 2) of the ideal pinhole to where they are in the raw image."""
+        flat = np.asarray(pixels, dtype=np.float64).reshape(-1, 2)
+        if not self.is_distorted or not len(flat):
+            return flat
+        rays = np.column_stack([(flat - (self.cx, self.cy)) / (self.fx, self.fy), np.ones(len(flat))])
+        moved, _ = cv2.projectPoints(rays, np.zeros(3), np.zeros(3), self.matrix, np.array(self.distortion))
+        return np.asarray(moved, dtype=np.float64).reshape(-1, 2)
 
     def undistort_image(self, image: npt.NDArray[PixelT], interpolation: int) -> npt.NDArray[PixelT]:
         """What an ideal pinhole of the same size would see instead of an image (H, W) or (H, W, C).

@@ -65,7 +65,7 @@ def test_what_is_determined_goes_into_the_camera_and_nothing_else() -> None:
     sure, unsure = a_time(0.02, 3e-4), a_time(0.02, 5e-3)
     setup = CameraSetup(CAMERA, 1000.0)
     applied = SensorEstimate(sure, unsure, unsure, Estimate(1.05, 0.002, 0.01, 10.0), 4).applied(setup)
-    assert (applied.intrinsics.readout, applied.intrinsics.delay, applied.intrinsics.depth_readout) == (0.02, 0, 0)
+    assert (applied.intrinsics.readout, applied.intrinsics.delay, applied.intrinsics.depth_readout) == (0.02, 0, None)
     assert applied.depth_scale == pytest.approx(1050.0)
     assert SensorEstimate().applied(setup) == setup
 

@@ -1,12 +1,14 @@
 """The pinhole camera."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from semslam.errors import ConfigError
-from semslam.geometry.camera import Intrinsics
+from semslam.geometry.camera import NO_DISTORTION, Intrinsics
 
 PINHOLE = Intrinsics(64, 48, 60.0, 61.0, 31.5, 23.5)
 FR1 = Intrinsics(
@@ -36,6 +38,14 @@ def test_undistorted_pixels_distort_back() -> None:
     rays = np.column_stack([(ideal - (FR1.cx, FR1.cy)) / (FR1.fx, FR1.fy), np.ones(3)])
     back = cv2.projectPoints(rays, np.zeros(3), np.zeros(3), FR1.matrix, np.array(FR1.distortion))[0].reshape(-1, 2)
     np.testing.assert_allclose(back, raw, atol=0.05)
+
+
+def test_distortion_undoes_what_undistortion_does() -> None:
+    ideal = np.array([[20.0, 30.0], [320.0, 240.0], [600.0, 450.0]])
+    assert np.allclose(FR1.undistort_pixels(FR1.distort_pixels(ideal)), ideal, atol=0.05)
+    plain = replace(FR1, distortion=NO_DISTORTION)
+    assert np.array_equal(plain.distort_pixels(ideal), ideal)
+    assert FR1.distort_pixels(np.zeros((0, 2))).shape == (0, 2)
 
 
 def test_rays_are_undistorted_and_cannot_be_written() -> None:
