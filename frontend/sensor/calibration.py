@@ -27,8 +27,9 @@ FARTHEST = np.array([0.1, 0.1, 0.1, 10.0, 10.0, 5.0])
 """How far from zero they may get on the way."""
 STEPS, RELAXATION, SETTLED = 14, 1.3, 2e-5
 """Steps at most, the factor on each, and the seconds below which steps end."""
-SPREAD = 2.0
-"""Factor from the equations' standard deviations to errors against truth: flow errs alike along a track."""
+FLOOR, SPREAD = 7e-4, 1.5
+"""Seconds of error that remain with any number of points, and the factor on what equations or scatter state: optical
+flow errs alike along a track. Both from rendered sequences (BENCHMARKS.md, "Sensors")."""
 
 
 def calibrate(
@@ -98,7 +99,8 @@ def _solve(stretches: Sequence[Stretch]) -> list[Estimate]:
             stretch.substitute(step)
         if np.abs(step[:3]).max() < SETTLED:
             break
-    sigmas = SPREAD * _sigmas([stretch.eliminate(values) for stretch in stretches], information) + np.abs(step)
+    stated = SPREAD * _sigmas([stretch.eliminate(values) for stretch in stretches], information)
+    sigmas = np.hypot(stated, FLOOR) + np.abs(step)
     return [a_time(float(values[i]), float(sigmas[i])) for i in range(3)]
 
 

@@ -4,8 +4,10 @@ from dataclasses import dataclass, replace
 
 from semslam.datasets.camera_file import CameraSetup
 
-SURE, LONGEST = 1e-3, 0.06
+SURE, LONGEST = 1.5e-3, 0.06
 """Seconds of standard deviation up to which a time counts as determined, and the longest read-out or delay."""
+FASTEST = 0.004
+"""Seconds; a shorter read-out is a global shutter's: no rolling one is as fast."""
 SURE_FACTOR, LARGEST_FACTOR = 0.01, 10.0
 """The same of the depth factor."""
 
@@ -80,5 +82,5 @@ class SensorEstimate:
 
 
 def _readout(found: Estimate) -> float:
-    """Seconds; none where it does not differ from none, since a global shutter is the likelier sensor then."""
-    return round(found.value, 6) if found.value > 2 * found.sigma else 0.0
+    """Seconds, or none where it is too short for a rolling shutter or does not differ from none."""
+    return round(found.value, 6) if found.value > max(FASTEST, 2 * found.sigma) else 0.0

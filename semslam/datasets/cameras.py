@@ -104,6 +104,11 @@ KNOWN_SEQUENCES = (
         r"rgbd_bonn",
         camera_poses=bonn_camera_poses,
     ),
+    KnownSequence(
+        "7-Scenes RedKitchen in another layout",
+        r"red_?kitchen",
+        CameraSetup(Intrinsics(640, 480, 525.0, 525.0, 320.0, 240.0, readout=KINECT_READOUT)),
+    ),
     ICL_NUIM,
 )
 """Sources: TUM https://cvg.cit.tum.de/data/datasets/rgbd-dataset/file_formats (calibration of the colour camera;
@@ -204,9 +209,9 @@ def layout_camera(folder: Path, config: DatasetConfig, stated: Callable[[], Came
 def find_camera(folder: Path, config: DatasetConfig) -> CameraSetup | None:
     """The camera that the user, a camera.yaml in the folder or the known family gives, in that order.
 
-    The depth scale is looked for in the same order, on its own. Which way the ground truth's y points is stated by
-    the sequence's own camera.yaml, or else by the family: a camera that the user names states nothing about poses,
-    unless its fy is negative.
+    The depth scale and the read-out are looked for in the same order, each on its own. Which way the ground truth's y
+    points is stated by the sequence's own camera.yaml, or else by the family: a camera that the user names states
+    nothing about poses, unless its fy is negative.
 
     Raises:
         DatasetError: a camera file is not readable.
@@ -221,6 +226,9 @@ def find_camera(folder: Path, config: DatasetConfig) -> CameraSetup | None:
         setup = calibrated
     else:
         return None
+    if known and setup.intrinsics.readout is None:
+        readout = known.camera.intrinsics.readout
+        setup = replace(setup, intrinsics=replace(setup.intrinsics, readout=readout))
     if config.camera and known and known.camera.y_up:
         turned = read_camera(own).y_up if own.exists() else known.camera.y_up
         setup = replace(setup, y_up=setup.y_up or turned)

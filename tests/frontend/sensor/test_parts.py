@@ -70,7 +70,7 @@ def test_what_is_determined_goes_into_the_camera_and_nothing_else() -> None:
     assert SensorEstimate().applied(setup) == setup
 
 
-@pytest.mark.parametrize(("seconds", "readout"), [(5e-4, 0.0), (-0.001, 0.0), (0.01, 0.01)])
+@pytest.mark.parametrize(("seconds", "readout"), [(5e-4, 0.0), (-0.001, 0.0), (0.003, 0.0), (0.01, 0.01)])
 def test_a_read_out_near_none_is_a_global_shutter(seconds: float, readout: float) -> None:
     applied = SensorEstimate(readout=a_time(seconds, 4e-4)).applied(CameraSetup(CAMERA))
     assert applied.intrinsics.readout == readout

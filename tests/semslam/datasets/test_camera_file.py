@@ -100,6 +100,16 @@ def test_the_user_wins_over_the_file_which_wins_over_the_name(tmp_path: Path) ->
     assert found(DatasetConfig(camera=tmp_path / "mine.yaml", depth_scale=3000.0)) == (250.5, 3000.0)
 
 
+def test_a_file_that_states_no_read_out_leaves_it_to_the_family(tmp_path: Path) -> None:
+    folder = tmp_path / "redkitchen"
+    folder.mkdir()
+    for text, readout in ((TEXT, 0.026), (TEXT + "readout: 0.01\n", 0.01), (TEXT + "readout: 0\n", 0.0)):
+        (folder / "camera.yaml").write_text(text)
+        setup = find_camera(folder, DatasetConfig())
+        assert setup is not None
+        assert (setup.intrinsics.fx, setup.intrinsics.readout) == (250, readout)
+
+
 @pytest.mark.parametrize(
     ("name", "fx"),
     [
