@@ -25,6 +25,7 @@ from semslam.cli import (
 )
 from semslam.cli.console import complain, remark
 from semslam.errors import SemslamError, SemslamWarning
+from semslam.runtime.stopping import Ended
 
 INTERRUPTED = 130
 FAILED = 2
@@ -82,6 +83,9 @@ def main() -> None:
     except SemslamError as error:
         complain(str(error))
         sys.exit(FAILED)
+    except Ended as error:
+        complain("Interrupted.")
+        sys.exit(error.exit_code)
     except KeyboardInterrupt:
         complain("Interrupted.")
         sys.exit(INTERRUPTED)

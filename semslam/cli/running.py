@@ -1,14 +1,13 @@
 """How a command carries out a run: it is computed, written and shown, and ends with the exit code that it deserves."""
 
 from collections.abc import Sequence
-from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
 
-from semslam.cli.console import complain, metrics_table, out, profile_table, remark, remarks
+from semslam.cli.console import complain, frame_progress, metrics_table, out, profile_table, remark, remarks
 from semslam.cli.progress import bar
 from semslam.errors import ResultsError, SemslamError
 
@@ -23,7 +22,6 @@ if TYPE_CHECKING:
     from semslam.runs.profile import Profile
     from semslam.runs.recording import Recording
     from semslam.runtime.stopping import Stop
-    from semslam.system.result import FrameState
     from semslam.viewers.viewer import Viewer
 
 NOT_TRACKED = 3
@@ -89,28 +87,16 @@ def carry_out(task: Task, place: "RunPlace", stop: "Stop", past: "JournalContent
 
 def _computed(task: Task, place: "RunPlace", stop: "Stop", past: "JournalContent | None") -> "RunResult":
     """Compute a run, with a journal of it beside the run folder."""
-    from semslam.loop.verification.verifier import build_verifier
-    from semslam.runs.files import writing
-    from semslam.runs.journal import JOURNAL, Journal, JournalHeader, RecallingVerifier
-    from semslam.runs.pipeline import replay, run
+    from semslam.runs.journal import JournalHeader
+    from semslam.runs.journaled import run_journaled
 
-    source = str(Path(task.source).resolve()) if Path(task.source).exists() else task.source
-    saved_run = None if task.saved_run is None else str(task.saved_run.resolve())
-    command, realtime = tuple(task.command), task.feed is not None
-    header = JournalHeader(task.config.dump(), source, task.plots, saved_run, command, realtime)
-    verifier = None if past is None else RecallingVerifier(build_verifier(task.config), past.outcomes)
-    with writing(place.directory):
-        journal = Journal(place.work / JOURNAL, header, past)
-    frames = len(task.dataset)
-    with closing(journal), bar(f"{task.dataset.name} {task.config.detector}", frames) as update:
-
-        def progress(index: int, state: "FrameState | None") -> None:
-            place.kept = True
-            update(index + 1, frames)
-
-        if task.recording is None:
-            return run(task.dataset, task.config, progress, task.viewer, stop, journal, verifier, task.feed)
-        return replay(task.dataset, task.recording, task.config, progress, verifier, task.viewer, stop, journal)
+    dataset, config, recording = task.dataset, task.config, task.recording
+    realtime = task.feed is not None
+    header = JournalHeader.of(config, task.source, task.plots, task.saved_run, task.command, realtime)
+    frames = len(dataset)
+    with bar(f"{dataset.name} {config.detector}", frames) as update:
+        progress = frame_progress(update, frames)
+        return run_journaled(dataset, config, header, place, progress, stop, past, recording, task.viewer, task.feed)
 
 
 def show(done: Done, task: Task) -> None:

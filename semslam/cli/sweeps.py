@@ -12,8 +12,9 @@ import typer
 
 from semslam.cli import options
 from semslam.cli.command import Command, example
-from semslam.cli.console import comparison_table, frame_progress, out, remark, text_table
+from semslam.cli.console import comparison_table, complain, frame_progress, out, remark, text_table
 from semslam.cli.progress import bar
+from semslam.cli.running import NOT_TRACKED
 from semslam.errors import ConfigError, ResultsError
 
 if TYPE_CHECKING:
@@ -58,11 +59,13 @@ def compare_command(
     dataset = open_dataset(sequence, config=chosen.dataset)
     directory = out_directory or new_directory(options.RUNS, dataset.name, "compare")
     names = options.detector_names(detectors)
-    runs = _compare(sequence, dataset.name, chosen, names, directory, plots, jobs, quiet=as_json)
+    outcomes = _compare(sequence, dataset.name, chosen, names, directory, plots, jobs, quiet=as_json)
     if as_json:
-        typer.echo(json.dumps([run.model_dump(mode="json") for run in runs]))
-    if out_directory is None:
-        link_latest(options.RUNS, directory / names[-1])
+        typer.echo(json.dumps([run.model_dump(mode="json") for run in _metrics(outcomes)]))
+    whole = [outcome.case.detector for outcome in outcomes if not outcome.failure]
+    if out_directory is None and whole:
+        link_latest(options.RUNS, directory / whole[-1])
+    _end(outcomes)
 
 
 def demo_command(
@@ -74,7 +77,9 @@ def demo_command(
 
     chosen = options.settings(odometry=DEMO_ODOMETRY, seed=seed)
     names = options.detector_names(DEMO_DETECTORS)
-    alone, closed = _compare(DEMO_SEQUENCE, DEMO_SEQUENCE, chosen, names, out_directory, plots=True)
+    outcomes = _compare(DEMO_SEQUENCE, DEMO_SEQUENCE, chosen, names, out_directory, plots=True)
+    _end(outcomes)
+    alone, closed = _metrics(outcomes)
     if out_directory == DEMO:
         link_latest(options.RUNS, out_directory / names[-1])
     before, after = alone.optimized.ate_rmse_m, closed.optimized.ate_rmse_m
@@ -108,6 +113,7 @@ def bench_command(
     import yaml
 
     from semslam.runs.files import writing
+    from semslam.runtime.stopping import Ended, end_on_signals
     from semslam.studies.sweep.engine import run_jobs
     from semslam.studies.sweep.files import summary_values, write_results
     from semslam.studies.sweep.others import external_results, published_results
@@ -124,8 +130,12 @@ def bench_command(
     others = (*published_results(chosen), *external_results(_externals(external), chosen, plan))
     text = yaml.safe_dump(chosen.model_dump(mode="json"), sort_keys=False, allow_unicode=True)
     _claim(directory, text)
-    with bar(chosen.name, len(plan), "runs") as update, _crew(jobs, scheduler) as crew:
-        outcomes = run_jobs(plan, crew, lambda _outcome, done, whole: update(done, whole))
+    try:
+        with end_on_signals(), bar(chosen.name, len(plan), "runs") as update, _crew(jobs, scheduler) as crew:
+            outcomes = run_jobs(plan, crew, lambda _outcome, done, whole: update(done, whole))
+    except (KeyboardInterrupt, Ended):
+        remark("Runs that are finished stay; start the command again to go on.")
+        raise
     result = SuiteResult(chosen.name, tuple(outcomes), tuple(summarise_suite(outcomes)), others)
     with writing(directory):
         write_results(result, text, directory)
@@ -138,6 +148,7 @@ def bench_command(
     if result.failures:
         remark(f"{len(result.failures)} of {len(outcomes)} runs failed; start the command again to repeat those.")
         raise typer.Exit(FAILED)
+    _end(outcomes)
 
 
 def _compare(
@@ -149,11 +160,12 @@ def _compare(
     plots: bool,
     jobs: int = 1,
     quiet: bool = False,
-) -> list["Metrics"]:
+) -> list["Outcome"]:
     """Run each detector on one odometry; what was found is shown even where a later run fails or is interrupted."""
     from semslam.runs.comparison import present_comparison
     from semslam.runs.files import write_json, writing
     from semslam.runs.place import reserved
+    from semslam.runtime.stopping import end_on_signals
     from semslam.studies.sweep.engine import run_jobs
     from semslam.studies.sweep.plan import comparison_jobs
 
@@ -163,28 +175,41 @@ def _compare(
             places.enter_context(reserved(job.directory))
     found: dict[str, Outcome] = {}
 
-    def metrics() -> list["Metrics"]:
-        outcomes = (found[name] for name in detectors if name in found)
-        return [outcome.metrics for outcome in outcomes if outcome.metrics is not None]
+    def outcomes() -> list["Outcome"]:
+        return [found[name] for name in detectors if name in found]
 
     def keep(outcome: "Outcome", _done: int, _whole: int) -> None:
         found[outcome.case.detector] = outcome
-        write_json(directory / "compare.json", [run.model_dump(mode="json") for run in metrics()])
+        write_json(directory / "compare.json", [run.model_dump(mode="json") for run in _metrics(outcomes())])
 
     try:
-        with nullcontext(_watched()) if jobs == 1 else _crew(jobs, None) as crew:
+        with end_on_signals(), nullcontext(_watched()) if jobs == 1 else _crew(jobs, None) as crew:
             run_jobs(plan, crew, keep)
     finally:
-        if metrics() and not quiet:
-            out.print(comparison_table(metrics(), f"{name}: {metrics()[0].frames} frames, {config.odometry} odometry"))
+        runs = _metrics(outcomes())
+        if runs and not quiet:
+            out.print(comparison_table(runs, f"{name}: {runs[0].frames} frames, {config.odometry} odometry"))
             out.print(f"Results: {directory}", soft_wrap=True)
-    failures = [f"{outcome.case.detector}: {outcome.failure}" for outcome in found.values() if outcome.failure]
-    if failures:
-        raise ResultsError(" ".join(failures))
-    if plots:
+    if plots and not any(outcome.failure for outcome in found.values()):
         with writing(directory):
             present_comparison(directory)
-    return metrics()
+    return outcomes()
+
+
+def _metrics(outcomes: Sequence["Outcome"]) -> list["Metrics"]:
+    return [outcome.metrics for outcome in outcomes if outcome.metrics is not None]
+
+
+def _end(outcomes: Sequence["Outcome"]) -> None:
+    """End as ``semslam run`` does where a run failed or tracked next to nothing."""
+    failures = [f"{outcome.case.detector}: {outcome.failure}" for outcome in outcomes if outcome.failure]
+    if failures:
+        raise ResultsError(" ".join(failures))
+    short = [outcome for outcome in outcomes if outcome.shortfall]
+    for outcome in short:
+        complain(f"{outcome.case}: {outcome.shortfall}")
+    if short:
+        raise typer.Exit(NOT_TRACKED)
 
 
 def _signed(plan: "Sequence[Job]") -> "list[Job]":

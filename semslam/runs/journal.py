@@ -4,6 +4,7 @@ The file is a row of records, each with its length and a CRC-32. A record that a
 follows a damaged one, is left out when the journal is read, and cut off when it is gone on with.
 """
 
+import errno
 import json
 import os
 import struct
@@ -61,6 +62,21 @@ class JournalHeader:
     command: tuple[str, ...]
     realtime: bool = False
     version: str = __version__
+
+    @classmethod
+    def of(
+        cls,
+        config: Config,
+        source: str,
+        plots: bool,
+        saved_run: Path | None,
+        command: Sequence[str],
+        realtime: bool = False,
+    ) -> Self:
+        """The header of a run; places are written in full, for it may be gone on with from another folder."""
+        whole = str(Path(source).resolve()) if Path(source).exists() else source
+        saved = None if saved_run is None else str(saved_run.resolve())
+        return cls(config.dump(), whole, plots, saved, tuple(command), realtime)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -138,7 +154,9 @@ class Journal:
         if self.note is not None:
             return
         try:
-            self._file.write(HEAD.pack(len(record), zlib.crc32(record)) + record)
+            whole = HEAD.pack(len(record), zlib.crc32(record)) + record
+            if self._file.write(whole) < len(whole):  # the disk took a part of it
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
             if time.monotonic() - self._synced > SYNC_INTERVAL:
                 os.fsync(self._file.fileno())
                 self._synced = time.monotonic()

@@ -14,12 +14,12 @@ FEW_DEPTHS = 0.2
 """Share of the keypoints with depth below which depth is to blame."""
 
 
-def shortfall(metrics: Metrics, keyframes: Sequence[Keyframe]) -> str | None:
+def shortfall(metrics: Metrics, keyframes: Sequence[Keyframe] = ()) -> str | None:
     """One sentence on why hardly a frame was tracked, or None where enough were.
 
     Args:
         metrics: of the run.
-        keyframes: of all maps.
+        keyframes: of all maps; without them the sentence gives no reason but unreadable images.
     """
     readable = metrics.frames - metrics.unreadable
     if metrics.tracked >= max(NEXT_TO_NOTHING * metrics.frames, min(2, readable)):
@@ -27,6 +27,8 @@ def shortfall(metrics: Metrics, keyframes: Sequence[Keyframe]) -> str | None:
     start = f"Only {metrics.tracked} of {metrics.frames} frames were tracked: "
     if readable <= NEXT_TO_NOTHING * metrics.frames:
         return start + f"{metrics.unreadable} images cannot be read."
+    if not keyframes:
+        return start.removesuffix(": ") + "."
     features = float(np.median([len(keyframe.features) for keyframe in keyframes]))
     if features < FEW_FEATURES:
         return start + f"the images show {features:.0f} keypoints each, as black, white or blurred ones do."

@@ -14,6 +14,18 @@ PATIENCE = 2.0
 """Seconds after the first signal from which another one breaks off a frame that does not end."""
 
 
+class Ended(BaseException):
+    """A signal other than Ctrl-C ends the program; no error, and so not caught as one.
+
+    Args:
+        number: the signal.
+    """
+
+    def __init__(self, number: int) -> None:
+        super().__init__(number)
+        self.exit_code = 128 + number
+
+
 class Stop:
     """Whether a run has been asked to end.
 
@@ -72,6 +84,31 @@ def stop_on_signals() -> Iterator[Stop]:
         signal.signal(number, stop.note)
     try:
         yield stop
+    finally:
+        for number in taken:
+            signal.signal(number, before[number])
+
+
+@contextmanager
+def end_on_signals() -> Iterator[None]:
+    """Raise ``Ended`` where a termination or a lost terminal comes within the block, so that files and processes are
+    left in order; within a ``stop_on_signals`` of a single run that one decides.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def end(number: int, _frame: FrameType | None) -> None:
+        if number == signal.SIGHUP:
+            _leave_terminal()
+        raise Ended(number)
+
+    before = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGHUP)}
+    taken = [number for number, handler in before.items() if handler is not signal.SIG_IGN]
+    for number in taken:
+        signal.signal(number, end)
+    try:
+        yield
     finally:
         for number in taken:
             signal.signal(number, before[number])
