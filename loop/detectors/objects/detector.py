@@ -119,8 +119,15 @@ class ObjectsDetector:
         ]
 
     def _shortlist(self, view: KeyframeView, submap: Submap) -> list[int]:
-        """Positions of earlier submaps, without a keyframe in common, that hold alike amounts of each group."""
-        alike = self._contents.rows @ submap.content
+        """Positions of earlier submaps, without a keyframe in common, that hold the same things.
+
+        What both hold of each group at each height, as a share of what the poorer one holds; groups that few submaps
+        hold weigh more (inverse document frequency).
+        """
+        contents = self._contents.rows
+        rarity = np.log((1 + len(contents)) / (1 + (contents > 0).sum(axis=0)))
+        common = np.minimum(contents, submap.content) @ rarity
+        alike = common / np.maximum(np.minimum(contents @ rarity, submap.content @ rarity), 1e-9)
         stamps = self._timeline.stamps
         old = (view.keyframe.timestamp - stamps >= self._loops.min_gap) & (stamps < submap.start)
         chosen: list[int] = []

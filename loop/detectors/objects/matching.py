@@ -12,7 +12,7 @@ from semslam.loop.detectors.objects.walls import BINS
 from semslam.types import Float32Array, IntArray
 
 BoolArray = npt.NDArray[np.bool_]
-TURNS = 6
+TURNS = 4
 """Maximum number of turns that are tried."""
 TURN_SHARE = 0.6
 """How good a turn must be, relative to the best, by the directions of surfaces."""
@@ -30,6 +30,8 @@ WALL_WEIGHT = 0.6
 """Weight of a wall of one square metre against an object of as many voxels."""
 LOOK_SHARE = 0.5
 """How much of an object's similarity is its look, where that counts."""
+PRIOR = 4.0
+"""Weight that is added to a submap's sum: where little was seen, a few pairs prove little."""
 ROUNDS = 3
 """Of least squares after the vote."""
 
@@ -40,7 +42,7 @@ class SubmapMatch:
 
     Attributes:
         T_match_query: (4, 4) pose of the query's level frame in the match's.
-        score: share of the smaller submap's weight that found its like, 0..1.
+        score: share of the smaller submap's weight, and of ``PRIOR``, that found its like, 0..1.
         objects: (K, 2) matched objects of query and match.
         walls: (L, 2) matched walls.
     """
@@ -207,7 +209,7 @@ def _refine(
     else:
         rise = pairs.rise
     T = make_transform(exp_so3((0.0, 0.0, turn)), (shift[0], shift[1], rise))
-    return SubmapMatch(T, min(value / total, 1.0), chosen, walls)
+    return SubmapMatch(T, min(value / (total + PRIOR), 1.0), chosen, walls)
 
 
 def _agreeing(

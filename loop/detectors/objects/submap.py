@@ -60,7 +60,7 @@ class Submap:
         objects: things.
         walls: vertical planes.
         azimuths: (G, B) int8 directions of vertical surfaces by group, the largest 127.
-        content: (3 G,) float32 how much there is of each group, low, at middle height and high; of length 1.
+        content: (3 G,) float32 how much there is of things of each group, low, at middle height and high.
     """
 
     anchor: int
@@ -118,7 +118,7 @@ def build_submap(clouds: Sequence[LabelledCloud], config: ObjectsConfig) -> Subm
         things,
         find_walls(centres, facing, config),
         azimuths(facing, winners, GROUP_COUNT),
-        _content(centres[:, 2] - ground, winners),
+        _content(things, ground),
     )
 
 
@@ -133,12 +133,11 @@ def _floor(centres: FloatArray, facing: FloatArray, winners: IntArray) -> float:
     return float(np.median(heights))
 
 
-def _content(heights: FloatArray, winners: IntArray) -> Float32Array:
-    layer = np.digitize(heights, HEIGHTS)
-    counts = np.bincount(winners * 3 + layer, minlength=3 * GROUP_COUNT).astype(np.float32)
-    counts[3 * VOID : 3 * VOID + 3] = 0
-    roots = np.sqrt(counts)
-    return np.asarray(roots / max(float(np.linalg.norm(roots)), 1e-9), dtype=np.float32)
+def _content(things: Objects, ground: float) -> Float32Array:
+    """The fourth root of sizes, so that many things count for more than one large one."""
+    layer = np.digitize(things.centroids[:, 2] - ground, HEIGHTS)
+    bins = things.groups.astype(np.int64) * 3 + layer
+    return np.sqrt(np.bincount(bins, np.sqrt(things.sizes), 3 * GROUP_COUNT)).astype(np.float32)
 
 
 def _objects(
