@@ -1,4 +1,4 @@
-"""Loop candidates as the page's script shows them: a row of the table, and everything that a click brings up."""
+"""Loop candidates as data for the page's script: table rows and details."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -33,7 +33,7 @@ REASONS = {
 
 @dataclass(frozen=True, slots=True)
 class KindOfLoop:
-    """How the script draws candidates of one kind."""
+    """One kind of candidates: name, legend, colour, dash and count."""
 
     name: str
     label: str
@@ -45,7 +45,7 @@ class KindOfLoop:
 
 @dataclass(frozen=True, slots=True)
 class Candidate:
-    """One candidate for the script.
+    """One candidate, as data for the script.
 
     Attributes:
         query: keyframe id.
@@ -79,7 +79,7 @@ class Candidate:
 
 
 def kinds_of(loops: Sequence[LedgerEntry]) -> list[KindOfLoop]:
-    """The kinds of candidates that there are."""
+    """The kinds of candidates."""
     counts = {look: sum(look_of(loop) is look for loop in loops) for look in LOOKS}
     return [
         KindOfLoop(look.name, look.label, look.color, dash_of(look.line), look.is_in_graph, count)

@@ -1,4 +1,4 @@
-"""What a page shows of one run: plain values, gathered before anything is drawn."""
+"""The content of a run's page, as plain values."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -91,7 +91,7 @@ class SemanticSection:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RunReport:
-    """Everything on a run's page.
+    """The content of a run's page.
 
     Attributes:
         verdict: the run in one sentence.

@@ -1,4 +1,4 @@
-"""Curves as the page's script draws them: plain lists, thinned and rounded so that the page stays small."""
+"""Curves as data for the page's script: lists, subsampled and rounded."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ MAX_POINTS = 4000
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """A curve for the script: its values are None where it is broken.
+    """A curve as data for the script; values are None at gaps.
 
     Attributes:
         name: in the legend.
@@ -39,7 +39,7 @@ class Line:
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """Paths in the plane in which they reach farthest: names of its axes and the curves."""
+    """Paths projected to the plane of their largest extent: names of its axes, and curves."""
 
     across: str
     up: str
@@ -47,7 +47,7 @@ class View:
 
 
 def view_of(paths: Sequence[Path], start: float) -> View:
-    """The view from above; ``start`` is the stamp that is called zero."""
+    """The projection of the paths; ``start`` is the stamp at time zero."""
     across, up = plane([path.trajectory for path in paths])
     lines = []
     for path in paths:

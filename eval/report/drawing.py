@@ -1,4 +1,4 @@
-"""What is drawn of a run, and the curves that its pictures and its page share."""
+"""The trajectories and loops of a run, and the curves that its plots and its page share."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -16,7 +16,7 @@ AXES = "xyz"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RunDrawing:
-    """What is drawn of a run.
+    """The trajectories and loops of a run, for plots.
 
     Attributes:
         title: stands above each picture.
@@ -34,7 +34,7 @@ class RunDrawing:
 
     @property
     def start(self) -> float:
-        """Stamp that plots call zero."""
+        """The stamp at time zero of the plots."""
         return float(min(self.odometry.timestamps[0], self.optimised.timestamps[0]))
 
     @property
@@ -54,7 +54,7 @@ class Path:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ErrorCurve:
-    """Values (N,) in metres over stamps (N,) in seconds, with a NaN where the trajectory has a hole."""
+    """Values (N,) in metres over stamps (N,) in seconds, with NaN at gaps of the trajectory."""
 
     stamps: FloatArray
     metres: FloatArray
@@ -63,7 +63,7 @@ class ErrorCurve:
 
 
 def aligned(run: RunDrawing) -> RunDrawing:
-    """The run with its trajectories aligned with the truth, or without a truth that does not meet them.
+    """The run with its trajectories aligned with ground truth; without ground truth where the two do not overlap.
 
     Raises:
         TrajectoryError: a trajectory of the run holds no pose.
@@ -82,20 +82,20 @@ def aligned(run: RunDrawing) -> RunDrawing:
 
 
 def paths(run: RunDrawing) -> list[Path]:
-    """The run's trajectories, those drawn first first."""
+    """The run's trajectories, in drawing order."""
     own = [Path(run.odometry, ODOMETRY, "odometry alone"), Path(run.optimised, OPTIMISED, "optimised")]
     return own if run.truth is None else [Path(run.truth, TRUTH, "ground truth"), *own]
 
 
 def plane(trajectories: Sequence[Trajectory]) -> tuple[int, int]:
-    """The two axes along which trajectories reach farthest, the farther first: the plane that they are drawn in."""
+    """The two axes of largest extent, the larger first: the plane of the plots."""
     extent = np.ptp(np.concatenate([trajectory.poses[:, :3, 3] for trajectory in trajectories]), axis=0)
     across, up = np.argsort(-extent, kind="stable")[:2].tolist()
     return across, up
 
 
 def error_curves(run: RunDrawing) -> list[ErrorCurve]:
-    """Position errors of an aligned run before and after optimisation; without truth, how far each pose moved."""
+    """Position errors of an aligned run before and after optimisation; without ground truth, how far each moved."""
     if run.truth is None:
         stamps, before, after = np.intersect1d(run.odometry.timestamps, run.optimised.timestamps, return_indices=True)
         shift = run.optimised.poses[after, :3, 3] - run.odometry.poses[before, :3, 3]
@@ -118,7 +118,7 @@ def loop_ends(run: RunDrawing, loops: Sequence[LedgerEntry]) -> FloatArray:
 
 
 def broken(stamps: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Stamps (N,) and values (N, ...) with a NaN where the stamps have a hole, so that no line bridges it."""
+    """Stamps (N,) and values (N, ...) with NaN inserted at gaps, so that no line is drawn across."""
     steps = np.diff(stamps)
     holes = np.flatnonzero(steps > max(0.5, 5 * float(np.median(steps)) if len(steps) else 0.0)) + 1
     return np.insert(stamps, holes, np.nan), np.insert(values, holes, np.nan, axis=0)

@@ -1,4 +1,4 @@
-"""The keyframes' images on a page: small JPEGs and label masks, as many as a budget of bytes allows."""
+"""Keyframe images for a page: small JPEGs and label masks within a limit of bytes."""
 
 import base64
 from collections.abc import Callable, Sequence
@@ -29,7 +29,7 @@ class LabelColor:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class KeyframeImage:
-    """What is shown of a keyframe.
+    """A keyframe's image and labels.
 
     Attributes:
         color: (H, W, 3) RGB.
@@ -62,7 +62,7 @@ class EmbeddedImage:
 
     @property
     def size(self) -> int:
-        """Bytes that it takes of the page."""
+        """Its size in bytes on the page."""
         return len(self.image) + len(self.mask or "")
 
 
@@ -80,7 +80,7 @@ NO_IMAGES = EmbeddedImages({})
 def embed_images(
     loops: Sequence[LedgerEntry], read: Callable[[int], KeyframeImage | None], budget: int = BUDGET
 ) -> EmbeddedImages:
-    """Images of the candidates' keyframes, doubtful and withdrawn loops first, the others spread over the run.
+    """Images of the candidates' keyframes: false, inaccurate and withdrawn loops first, the others spread over the run.
 
     Args:
         loops: all candidates.

@@ -1,4 +1,4 @@
-"""A picture of methods compared: each one's mean error with its confidence interval, sequence by sequence."""
+"""A plot of methods' mean errors with confidence intervals, a panel for each sequence."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

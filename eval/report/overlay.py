@@ -1,4 +1,4 @@
-"""Pictures of a comparison: all its runs over one another."""
+"""Plots of a comparison, all runs in one."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,14 +17,14 @@ from semslam.types import Trajectory
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NamedTrajectory:
-    """A run's final trajectory and what the run is called in a comparison."""
+    """A run's final trajectory and its name in a comparison."""
 
     name: str
     trajectory: Trajectory
 
 
 def compared_paths(runs: Sequence[NamedTrajectory], truth: Trajectory | None) -> list[Path]:
-    """Trajectories aligned with the truth, which comes first; without one, as they are.
+    """Trajectories aligned with ground truth, which comes first; unaligned where there is none.
 
     Raises:
         TrajectoryError: no run holds a pose.

@@ -1,4 +1,4 @@
-"""Pages for runs and comparisons: one HTML file each, with pictures and scripts inside, that needs no network."""
+"""Report pages of runs and comparisons: self-contained HTML files."""
 
 from dataclasses import asdict, dataclass
 from functools import cache
@@ -35,7 +35,7 @@ class ComparedRun:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ComparisonReport:
-    """Everything on a comparison's page.
+    """The content of a comparison's page.
 
     Attributes:
         title: what was compared.

@@ -45,7 +45,7 @@ def draw_run(run: RunDrawing, settings: PictureSettings = PLAIN) -> dict[str, by
 
 
 def view_size(trajectories: list[Trajectory]) -> tuple[float, float]:
-    """Width and height in inches of a view from above that has no empty sides."""
+    """Width and height in inches that fit the extent of a top view."""
     across, up = plane(trajectories)
     extent = np.ptp(np.concatenate([trajectory.poses[:, :3, 3] for trajectory in trajectories]), axis=0)
     ratio = float(extent[up] / extent[across]) if extent[across] > 0 else 1.0
@@ -53,7 +53,7 @@ def view_size(trajectories: list[Trajectory]) -> tuple[float, float]:
 
 
 def draw_top_view(figure: Figure, run: RunDrawing) -> None:
-    """The paths in the plane in which they reach farthest; loops in the graph lie below them, fainter the more."""
+    """The paths in the plane of their largest extent, over the accepted loops, which are fainter the more there are."""
     across, up = plane([path.trajectory for path in paths(run)])
     axes = figure.add_subplot()
     for order, path in enumerate(paths(run)):

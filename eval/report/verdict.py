@@ -1,4 +1,4 @@
-"""What a run or a comparison amounts to, in one sentence."""
+"""The verdict on a run or a comparison, in one sentence."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ SAME_FRAMES = 0.95
 
 
 class Tone(StrEnum):
-    """How good the news is."""
+    """Whether a verdict is good, neutral or bad."""
 
     GOOD = "good"
     PLAIN = "plain"
@@ -32,7 +32,7 @@ class Verdict:
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """The errors that a verdict is about: ATE in metres, None where unknown, and the share of frames tracked.
+    """The errors behind a verdict: ATE in metres, None where unknown, and the share of tracked frames.
 
     Attributes:
         odometry: of the front end's own trajectory.

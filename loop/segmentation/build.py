@@ -1,4 +1,4 @@
-"""Making the segmenter that the settings ask for."""
+"""Builds the segmenter that the settings name."""
 
 from semslam.config import Config
 from semslam.loop.segmentation.segmenter import Segmenter
@@ -7,7 +7,7 @@ from semslam.plugins import load
 
 
 def build_segmenter(config: Config) -> Segmenter:
-    """Make the segmenter ``segmentation.name``, behind a cache where ``segmentation.cache_dir`` is set.
+    """Build the segmenter ``segmentation.name``, with a cache where ``segmentation.cache_dir`` is set.
 
     Raises:
         ConfigError: the name is unknown or a setting does not fit.

@@ -1,4 +1,4 @@
-"""From a photo to the network's input, and from its logits to labels: the same for every inference engine."""
+"""Pre- and postprocessing of the network, shared by all inference engines: photo to input, logits to labels."""
 
 import cv2
 import numpy as np
@@ -37,7 +37,7 @@ def shrink(color: UInt8Array, size: tuple[int, int]) -> UInt8Array:
 
 
 def decode(logits: Float32Array, size: tuple[int, int], min_confidence: float = 0.0) -> LabelMap:
-    """Labels and confidence of the network's answer.
+    """Labels and confidence from the network's logits.
 
     The logits are enlarged to four times their size (the network's input), the labels from there to ``size`` by
     nearest neighbour. A label that wins in no cell of the answer is not looked for between cells: in thin seams, where

@@ -13,12 +13,12 @@ MIN_SHARE = 0.003
 
 
 def colorize(label_map: LabelMap) -> UInt8Array:
-    """Paint the labels, (H, W, 3) uint8 RGB; class lists longer than the palette use it again."""
+    """Labels as colours, (H, W, 3) uint8 RGB; the palette repeats for longer class lists."""
     return np.asarray(PALETTE[_palette_rows(len(label_map.names))][label_map.labels], dtype=np.uint8)
 
 
 def draw_overlay(color: UInt8Array, label_map: LabelMap, opacity: float = 0.55) -> UInt8Array:
-    """Lay the labels over an image, with a legend on its right.
+    """Draw the labels over an image, with a legend to its right.
 
     Args:
         color: (H, W, 3) uint8 RGB.

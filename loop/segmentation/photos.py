@@ -25,7 +25,7 @@ class Photo:
 
 
 def list_names(directory: Path, split: str) -> list[str]:
-    """Names in a split file such as ``val.txt``; every labelled photo if there is no file of that name to ask for.
+    """Names in a split file such as ``val.txt``, or of all labelled photos where none is asked for.
 
     Raises:
         DatasetError: the folder or file does not exist or names nothing.

@@ -26,7 +26,7 @@ class TrainingConfig(Section):
     """How the segmentation network is trained; the size of its input is the segmenter's."""
 
     start: Path | None = Field(None, description="weights to start from: ADE20K state dict or own checkpoint")
-    decoder_channels: int | None = Field(None, gt=0, description="narrow the start's decoder to these")
+    decoder_channels: int | None = Field(None, gt=0, description="channels of the decoder; fewer than the start's prunes it")
     epochs: int = Field(60, gt=0, description="passes over the labelled photos")
     batch: int = Field(8, gt=1, description="views in one step")
     rate: float = Field(1e-3, gt=0, description="peak learning rate of decoder and head")
@@ -39,8 +39,8 @@ class TrainingConfig(Section):
     strong_share: float = Field(0.0, ge=0, le=1, description="share of views taken close, rolled, blurred, badly lit")
     patch_share: float = Field(0.0, ge=0, le=1, description="share of views that hold a patch of another view")
     rare_share: float = Field(0.0, ge=0, le=1, description="share of views drawn by class, every class as often")
-    unlabelled: Path | None = Field(None, description="folder of photos without labels, for teachers to judge")
-    teachers: tuple[Path, ...] = Field((), description="weights of the networks that judge them together")
-    unlabelled_share: float = Field(0.4, ge=0, lt=1, description="share of views drawn from those photos")
+    unlabelled: Path | None = Field(None, description="folder of photos without labels, for self-training")
+    teachers: tuple[Path, ...] = Field((), description="weights of the networks whose mean prediction labels them")
+    unlabelled_share: float = Field(0.4, ge=0, lt=1, description="share of views drawn from the unlabelled photos")
     threads: int = Field(1, gt=0, description="training threads")
     save_every: float = Field(60.0, gt=0, description="seconds between checkpoints")

@@ -1,4 +1,4 @@
-"""Two saved runs of one place brought into one world, by loops between them."""
+"""Aligns two saved runs of one place by loops between them."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -23,7 +23,7 @@ DETECTOR = "fused"
 
 
 def align_runs(first: SavedViews, second: SavedViews, progress: Progress = silent) -> FloatArray:
-    """Find where the second run's world lies in the first one's.
+    """Estimate the transform from the second run's world to the first one's, by loops between them.
 
     The first run's detector proposes pairs of keyframes across the runs, and the usual verification decides. Each
     verified loop says where the second world lies. The largest set of loops that say the same as one of them wins.

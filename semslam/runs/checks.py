@@ -1,4 +1,4 @@
-"""A run against limits, for those who want to know at once when a change makes their results worse."""
+"""Checks a run's metrics against limits, for continuous integration."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ from semslam.runs.metrics import Metrics
 
 
 class Side(StrEnum):
-    """On which side of its limit a value is right."""
+    """Whether a limit is a maximum or a minimum."""
 
     AT_MOST = "at most"
     AT_LEAST = "at least"
@@ -16,7 +16,7 @@ class Side(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
-    """Something that can be limited.
+    """A metric that can have a limit.
 
     Attributes:
         name: for people, with its unit.
@@ -48,7 +48,7 @@ QUANTITIES: dict[str, Quantity] = {
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """A value against its limit.
+    """A metric's value compared with its limit.
 
     Attributes:
         name: the quantity, with its unit.
@@ -64,14 +64,14 @@ class Check:
 
     @property
     def kept(self) -> bool:
-        """Whether the value is known and on the right side."""
+        """Whether the value is known and within the limit."""
         if self.value is None:
             return False
         return self.value <= self.limit if self.side is Side.AT_MOST else self.value >= self.limit
 
 
 def check_run(metrics: Metrics, limits: dict[str, float]) -> list[Check]:
-    """Hold a run's metrics against limits by their names in ``QUANTITIES``.
+    """Compare a run's metrics with limits, by their names in ``QUANTITIES``.
 
     That a run was interrupted fails as a check of its own, since its values are of a part of the sequence.
     """

@@ -10,19 +10,19 @@ from semslam.runtime.usage import ProcessUsage, usage_now
 
 
 class RunClock:
-    """Starts when it is made; a process that worked beside the run counts with all that it has used."""
+    """Measures a run from its creation on; processor time of a worker process is included."""
 
     def __init__(self) -> None:
         self._wall, self._start = time.perf_counter(), usage_now()
         self._beside: ProcessUsage | None = None
 
     def note(self, usage: ProcessUsage) -> None:
-        """Take in what loop closing has used so far, wherever it runs."""
+        """Add what loop closing has used so far, in whichever process it runs."""
         if usage.process != self._start.process:
             self._beside = usage
 
     def read(self, frames: int, stopwatch: Stopwatch, latencies: Latencies) -> TimeMetrics:
-        """The times of a run of so many frames."""
+        """The times of the run, given its number of frames."""
         wall, now, beside = time.perf_counter() - self._wall, usage_now(), self._beside
         return TimeMetrics(
             wall_s=round(wall, 3),

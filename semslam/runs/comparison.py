@@ -1,4 +1,4 @@
-"""The pictures and the page of runs that are compared, such as one sequence with several detectors."""
+"""Plots and report page of a comparison, such as of several detectors on one sequence."""
 
 import json
 from collections.abc import Sequence
@@ -39,7 +39,7 @@ def present_comparison(directory: Path) -> None:
 
 
 def write_comparison_plots(runs: Sequence[SavedRun], directory: Path, settings: PictureSettings = PLAIN) -> list[Path]:
-    """Write the pictures in which runs lie over one another, and return their paths."""
+    """Draw all runs in one plot each of trajectories and errors; returns the paths."""
     directory.mkdir(parents=True, exist_ok=True)
     pictures = draw_comparison(_trajectories(runs), runs[0].ground_truth, runs[0].metrics.sequence, settings)
     paths = {directory / f"{name}.{settings.format.value}": content for name, content in pictures.items()}
@@ -49,7 +49,7 @@ def write_comparison_plots(runs: Sequence[SavedRun], directory: Path, settings: 
 
 
 def comparison_report(runs: Sequence[SavedRun], directory: Path) -> ComparisonReport:
-    """Everything on the page; runs below ``directory`` are linked to their own pages."""
+    """The content of the page; runs below ``directory`` link to their own pages."""
     names = _names([run.metrics for run in runs])
     errors = [(name, run.metrics.optimized.ate_rmse_m) for name, run in zip(names, runs, strict=True)]
     return ComparisonReport(

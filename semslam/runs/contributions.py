@@ -1,4 +1,4 @@
-"""What each accepted loop brought: how the graph, and its error, would be without it."""
+"""What each accepted loop contributes: the graph and its error without that loop."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -16,7 +16,7 @@ from semslam.types import Keyframe, LoopContribution, Trajectory, Transform
 def loop_contributions(
     solution: GraphSolution, keyframes: Sequence[Keyframe], truth: Trajectory | None, config: BackendConfig
 ) -> list[LoopContribution | None]:
-    """Leave each accepted loop out once.
+    """Solve the graph without each accepted loop in turn.
 
     Args:
         solution: the optimised graph.
@@ -57,7 +57,7 @@ class _KeyframeError:
         self._keys = [key_at[stamp] for stamp in self._pairs.timestamps.tolist()]
 
     def difference(self, poses: Mapping[int, Transform], reference: Mapping[int, Transform]) -> float | None:
-        """By how many metres the ATE of ``poses`` is larger than that of ``reference``."""
+        """The ATE of ``poses`` minus that of ``reference``, metres."""
         if self._pairs is None:
             return None
         return self._ate(self._pairs, poses) - self._ate(self._pairs, reference)

@@ -13,7 +13,7 @@ from semslam.errors import ResultsError
 
 @contextlib.contextmanager
 def writing(path: Path) -> Iterator[None]:
-    """Turn what can go wrong while ``path`` is written into one sentence."""
+    """Turn an OSError while ``path`` is written into a ResultsError of one sentence."""
     try:
         yield
     except OSError as error:
@@ -35,7 +35,7 @@ def write_json(path: Path, value: object) -> None:
 
 
 def check_place(directory: Path) -> None:
-    """Find out before long work whether a folder can be made, or written to where it stands; makes nothing.
+    """Check before long work that a folder can be created or written to; creates nothing.
 
     Raises:
         ResultsError: it cannot.
@@ -49,7 +49,7 @@ def _existing(directory: Path) -> Path:
 
 
 def sync(path: Path) -> None:
-    """Make a file's content, or a folder's entries, outlive a power cut."""
+    """Flush a file's content, or a folder's entries, to the disk."""
     descriptor = os.open(path, os.O_RDONLY)
     try:
         os.fsync(descriptor)

@@ -1,4 +1,4 @@
-"""The inlier matches of verified loops, kept small beside the ledger so that a report can draw them later."""
+"""A sample of each verified loop's inlier matches, stored for the report."""
 
 import zipfile
 from collections.abc import Mapping, Sequence

@@ -1,4 +1,4 @@
-"""A run's journal: what it has found so far, appended as it goes, so that nothing is lost to a kill or a power cut.
+"""A run's journal: motions and verified candidates, appended as they are found, to resume a run that was killed.
 
 The file is a row of records, each with its length and a CRC-32. A record that a crash has cut short, and whatever
 follows a damaged one, is left out when the journal is read, and cut off when it is gone on with.
@@ -81,7 +81,7 @@ class JournalHeader:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JournalContent:
-    """What stands in a journal.
+    """The content of a journal.
 
     Attributes:
         header: what the run was asked to do.
@@ -97,11 +97,11 @@ class JournalContent:
 
 
 class JournalError(ResultsError):
-    """A run that is gone on with does not come out as its journal has it."""
+    """A resumed run differs from its journal."""
 
 
 class Journal:
-    """Appends to a journal; of a run that is gone on with, it makes sure that the frames come out again as they were.
+    """Appends to a journal; when a run is resumed, checks that its frames come out as recorded.
 
     Where the disk is full the run goes on without it, and ``note`` says so.
 
@@ -124,7 +124,7 @@ class Journal:
             self._append(b"H" + json.dumps(asdict(header)).encode())
 
     def frame(self, state: FrameState) -> None:
-        """Take a frame that was done.
+        """Record a processed frame.
 
         Raises:
             JournalError: the journal has it otherwise.
@@ -139,7 +139,7 @@ class Journal:
             )
 
     def outcomes(self, outcomes: Sequence[Verification]) -> None:
-        """Take what the verification made of candidates; those that the journal has already come first."""
+        """Record the outcomes of candidates; those that the journal already holds come first."""
         for outcome in outcomes:
             if self._known:
                 self._known -= 1
@@ -147,7 +147,7 @@ class Journal:
                 self._append(b"V" + json.dumps(_plain(outcome), default=_number).encode())
 
     def close(self) -> None:
-        """Write no more."""
+        """Close the file."""
         self._file.close()
 
     def _append(self, record: bytes) -> None:
@@ -165,7 +165,7 @@ class Journal:
 
 
 class RecallingVerifier:
-    """A verifier that gives what a journal holds, and asks another one for the rest; may be sent to a process.
+    """Returns the outcomes that a journal holds and lets another verifier decide the rest; can be pickled.
 
     Args:
         inner: decides on what the journal does not hold.

@@ -1,4 +1,4 @@
-"""Keyframes' images for a report, read and labelled again."""
+"""Images and labels of keyframes, read again for a report."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -19,7 +19,7 @@ LABELS_SHOWN = 8
 
 
 def image_reader(dataset: Dataset | None, config: Config) -> Callable[[int], KeyframeImage | None]:
-    """Reads a frame's image, and labels it where the run's detector asks for labels."""
+    """A function that reads a frame's image, and its labels where the run's detector needs them."""
     segmenter = _segmenter(config) if dataset is not None else None
 
     def read(index: int) -> KeyframeImage | None:

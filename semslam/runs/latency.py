@@ -1,4 +1,4 @@
-"""How long frames and loops take from their coming to their effect."""
+"""Latency of frames and loops: from arrival to effect."""
 
 import time
 from collections.abc import Sequence
@@ -9,7 +9,7 @@ from semslam.runs.metrics import Latency
 
 
 class Latencies:
-    """Notes when frames come and are done, and when loops move the live poses; reported, and deciding nothing."""
+    """Records when frames arrive and are done, and when loops move the live poses; for the report only."""
 
     def __init__(self) -> None:
         self._begun = self._came = time.perf_counter()
@@ -19,7 +19,7 @@ class Latencies:
         self._keyframes: dict[int, float] = {}
 
     def begin(self, came: float | None = None) -> None:
-        """A frame is taken up.
+        """Note that a frame's processing begins.
 
         Args:
             came: when it came, in seconds of ``time.perf_counter``; None = now.
@@ -28,7 +28,7 @@ class Latencies:
         self._came = self._begun if came is None else came
 
     def done(self, keyframe: int | None) -> None:
-        """Its pose is known.
+        """Note that the frame's pose is known.
 
         Args:
             keyframe: the keyframe that it has become, if any.
@@ -40,7 +40,7 @@ class Latencies:
             self._keyframes[keyframe] = self._came
 
     def loop(self, keyframe: int) -> None:
-        """A loop of a keyframe moves the poses from now on."""
+        """Note that loops of a keyframe move the live poses from now on."""
         came = self._keyframes.get(keyframe, self._came)
         self._loops.append((came, time.perf_counter() - came))
 
@@ -61,17 +61,17 @@ class Latencies:
 
     @property
     def lag_ms(self) -> Latency | None:
-        """Milliseconds from a frame's coming to its pose."""
+        """Milliseconds from a frame's arrival to its pose."""
         return latency(self._lag, 1e3)
 
     @property
     def loop_s(self) -> Latency | None:
-        """Seconds from a keyframe's coming to the effect of its loops."""
+        """Seconds from a keyframe's arrival to the effect of its loops."""
         return latency([seconds for _, seconds in self._loops], 1.0)
 
 
 def latency(seconds: Sequence[float], unit: float) -> Latency | None:
-    """Quantiles of times, in a unit of which a second has so many; None where there are none."""
+    """Quantiles of times in seconds, times ``unit`` (1000 = milliseconds); None where there are no times."""
     if not seconds:
         return None
     median, p95, p99, worst = np.round(unit * np.quantile(seconds, [0.5, 0.95, 0.99, 1.0]), 4).tolist()

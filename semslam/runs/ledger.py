@@ -1,4 +1,4 @@
-"""Ledger entries out of a finished run: one per candidate."""
+"""Makes the ledger of a finished run: one entry per candidate."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any

@@ -48,12 +48,12 @@ class Manifest(BaseModel):
     checksum: str = ""
 
     def digest(self) -> str:
-        """What ``checksum`` should be."""
+        """The expected value of ``checksum``."""
         absent = {"checksum"} if self.commit else {"checksum", "commit"}  # earlier versions knew of no commit
         return hashlib.sha256(self.model_dump_json(exclude=absent).encode()).hexdigest()
 
     def check(self, directory: Path, *names: str) -> None:
-        """Make sure that files are as they were written.
+        """Check size and checksum of files.
 
         Raises:
             ResultsError: one is missing, shortened or changed.
@@ -84,7 +84,7 @@ def read_manifest(directory: Path) -> Manifest:
 
 
 def foreign_files(directory: Path) -> list[str]:
-    """What lies in a folder that no run of ours wrote; all of it where there is no manifest."""
+    """Files in a folder that the manifest does not list; all of them where there is no manifest."""
     found = [str(path.relative_to(directory)) for path in sorted(directory.rglob("*")) if not _is_folder(path)]
     try:
         ours = {MANIFEST, *_read(directory).files}
@@ -94,7 +94,7 @@ def foreign_files(directory: Path) -> list[str]:
 
 
 def seal(directory: Path, metrics: str, command: Sequence[str] | None = None) -> None:
-    """Write the manifest of a filled folder, and the metrics as the last file; all of it outlives a power cut.
+    """Write a filled folder's manifest, then the metrics as the last file, and flush all to the disk.
 
     Args:
         directory: holds every other file of the run.
@@ -106,7 +106,7 @@ def seal(directory: Path, metrics: str, command: Sequence[str] | None = None) ->
 
 
 def seal_again(directory: Path) -> None:
-    """Take files into the manifest of a finished run that were added to it or written again.
+    """Update the manifest of a finished run after files were added or rewritten.
 
     Version, commit and command line stay those of the run.
 

@@ -1,4 +1,4 @@
-"""The maps of a saved run, made again from its sequence."""
+"""Makes the maps of a saved run from its sequence."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -35,7 +35,7 @@ class MapRequest:
 
 
 def write_maps(saved: SavedViews, request: MapRequest, directory: Path, progress: Progress) -> list[Path]:
-    """Write the maps that are asked for into a folder.
+    """Write the requested maps into a folder.
 
     Args:
         saved: the run and its images.

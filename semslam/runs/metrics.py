@@ -1,4 +1,4 @@
-"""The figures of a run: the contract for every tool that reads runs (``metrics.json``)."""
+"""The metrics of a run: the contract of ``metrics.json``."""
 
 from pydantic import BaseModel, ConfigDict
 
@@ -10,7 +10,7 @@ class _Record(BaseModel):
 
 
 class LoopMetrics(_Record):
-    """How many loops got how far; ``true``, ``inaccurate`` and ``false`` split the accepted ones by ground truth."""
+    """Counts of loops; ``true``, ``inaccurate`` and ``false`` classify the accepted ones by ground truth."""
 
     proposed: int
     verified: int
@@ -52,7 +52,7 @@ class TimeMetrics(_Record):
 
 
 class RealTimeMetrics(_Record):
-    """Of a run whose frames came at their own time: it depends on the speed of the machine.
+    """Metrics of a run in real time, which depend on the speed of the machine.
 
     Attributes:
         rate_hz: frames per second; None = at their stamps.
@@ -94,7 +94,7 @@ class SensorMetrics(_Record):
 
 
 class Metrics(_Record):
-    """All figures of one run.
+    """All metrics of one run.
 
     Attributes:
         sequence: the dataset's name.

@@ -1,4 +1,4 @@
-"""The place of a run on disk: reserved before the first frame, given its name once the results are whole."""
+"""The folder of a run: reserved before the first frame, renamed into place once the results are complete."""
 
 import contextlib
 import fcntl
@@ -39,7 +39,7 @@ class RunPlace:
 
     @contextlib.contextmanager
     def results(self) -> Iterator[Path]:
-        """Give an empty folder to fill; once that is done it takes the place of ``directory``.
+        """An empty folder to fill, which is then renamed to ``directory``.
 
         An earlier run there is moved aside first and removed afterwards. Where something else has come to lie there
         in the meantime, the results take the next free name.
@@ -64,7 +64,7 @@ class RunPlace:
             self.kept = False
 
     def release(self) -> None:
-        """Give the lock back; what is not kept is removed."""
+        """Release the lock and remove what is not kept."""
         if not self.kept:
             shutil.rmtree(self.work, ignore_errors=True)
         os.close(self._lock)
@@ -72,7 +72,7 @@ class RunPlace:
 
 @contextlib.contextmanager
 def reserved(directory: Path, frames: int = 0) -> Iterator[RunPlace]:
-    """Reserve a run folder that the user named; all that would keep the run from being written is found out now.
+    """Reserve a run folder that the user named; whatever would keep it from being written is an error now.
 
     Args:
         directory: the run folder itself; an earlier run there is replaced once the new one is whole.
@@ -128,7 +128,7 @@ def new_directory(root: Path, sequence: str, study: str) -> Path:
 
 @contextlib.contextmanager
 def reopened(directory: Path) -> Iterator[RunPlace]:
-    """Take up the place of a run that did not finish, with all that it left there.
+    """Reserve the folder of an unfinished run again, with its content.
 
     Raises:
         ResultsError: no such run is there, or it is still being written.

@@ -1,4 +1,4 @@
-"""A saved run shown again, as it went."""
+"""Replays a saved run in a viewer."""
 
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
@@ -19,7 +19,7 @@ from semslam.viewers.viewer import FinishedRun, KeyframeScene, LoopScene, ShownL
 
 
 def play(saved: SavedViews, viewer: Viewer, progress: Progress = silent) -> None:
-    """Show a saved run to a viewer: the live poses frame by frame, images at keyframes, and what came out.
+    """Show a saved run in a viewer: live poses frame by frame, keyframes' images, and the result.
 
     The images are read again and labelled by the segmenter of the run's settings.
 
@@ -56,7 +56,7 @@ def play(saved: SavedViews, viewer: Viewer, progress: Progress = silent) -> None
 
 
 def has_semantic_map(directory: Path) -> bool:
-    """Whether ``semslam map RUN --semantic`` has put one into a run folder."""
+    """Whether a run folder holds a semantic map (``semslam map RUN --semantic``)."""
     return {PLY, JSON} <= read_manifest(directory).files.keys()
 
 

@@ -1,4 +1,4 @@
-"""A saved run's pictures and its report page."""
+"""Plots and report page of a saved run."""
 
 import shlex
 from collections.abc import Iterator, Mapping
@@ -46,7 +46,7 @@ def write_plots(run: SavedRun, directory: Path, settings: PictureSettings = PLAI
 
 
 def run_drawing(run: SavedRun) -> RunDrawing:
-    """What is drawn of a run."""
+    """The trajectories and loops of a saved run, for plots."""
     metrics = run.metrics
     return RunDrawing(
         title=f"{metrics.sequence}: {metrics.odometry} odometry, {metrics.detector} loops",
@@ -58,7 +58,7 @@ def run_drawing(run: SavedRun) -> RunDrawing:
 
 
 def run_report(run: SavedRun, dataset: Dataset | None) -> RunReport:
-    """Everything on a run's page."""
+    """The content of a run's report page."""
     metrics = run.metrics
     return RunReport(
         verdict=judge_run(_outcome(metrics), run.ledger),
@@ -78,7 +78,7 @@ def run_report(run: SavedRun, dataset: Dataset | None) -> RunReport:
 
 
 def origin_of(directory: Path) -> tuple[Fact, ...]:
-    """Version, commit and command line of a run, as far as it knows them."""
+    """Version, commit and command line of a run, where it recorded them."""
     manifest = read_manifest(directory)
     command = None if manifest.command is None else shlex.join(manifest.command)
     known = (("version", f"semslam {manifest.version}"), ("commit", manifest.commit), ("command line", command))

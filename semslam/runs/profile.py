@@ -18,7 +18,7 @@ MAIN, READING, LOOPS = "MainThread", "semslam-reader", "semslam-worker"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Profile:
-    """What was timed of a run, in seconds.
+    """The timed calls of a run, in seconds.
 
     Attributes:
         process: the run's own; loops may be closed in another one.

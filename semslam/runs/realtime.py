@@ -1,4 +1,4 @@
-"""What a run in real time did without."""
+"""Frames and candidates that a run in real time left out."""
 
 from semslam.datasets.feed import Feed
 from semslam.runs.metrics import Latency, RealTimeMetrics
@@ -10,7 +10,7 @@ LISTED = 20
 
 
 def measure_realtime(feed: Feed, slam: SlamResult, lag_ms: Latency) -> RealTimeMetrics:
-    """Count what was left out.
+    """Count dropped frames and unverified candidates.
 
     Args:
         feed: where the frames came from.

@@ -1,4 +1,4 @@
-"""A front end's work, saved: with it detection, verification and back end can be repeated without tracking again."""
+"""A saved front end, from which detection, verification and back end can be repeated without tracking."""
 
 import zipfile
 import zlib
@@ -27,7 +27,7 @@ FIXED = ("odometry", "dataset", "keyframes.interval", "keyframes.max_translation
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RecordedFrame:
-    """A frame's place in the sequence, its stamp in seconds and what the odometry said of it."""
+    """A frame's index in the sequence, its stamp in seconds and its motion."""
 
     index: int
     timestamp: float
@@ -51,7 +51,7 @@ class Recording:
     checksum: int
 
     def check(self, dataset: Dataset) -> None:
-        """Make sure that a dataset is the sequence that was recorded.
+        """Check that a dataset is the recorded sequence.
 
         Raises:
             DatasetError: it is another one, or its first image cannot be read.
@@ -67,7 +67,7 @@ class Recording:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SavedFrontEnd:
-    """What a replay needs of a run folder.
+    """The part of a run folder that a replay reads.
 
     Attributes:
         config: the settings it ran with.
@@ -80,7 +80,7 @@ class SavedFrontEnd:
     source: str | None
 
     def check_settings(self, wanted: Config) -> None:
-        """Make sure that settings ask for nothing that only tracking anew could give.
+        """Check that the settings of the front end are those of the recording.
 
         Raises:
             ConfigError: a setting of the front end differs.
@@ -117,7 +117,7 @@ def checksum(frame: Frame) -> int:
 
 
 def write_recording(directory: Path, recording: Recording, source: str | None = None) -> None:
-    """Write a recording into a run folder, and what the sequence was opened by; the same one gives the same bytes.
+    """Write a recording and the sequence's source into a run folder; the same input gives the same bytes.
 
     Args:
         directory: the run folder.
@@ -151,7 +151,7 @@ def write_recording(directory: Path, recording: Recording, source: str | None = 
 
 
 def read_front_end(directory: Path) -> SavedFrontEnd:
-    """Read of a run folder what a replay needs.
+    """Read the front end of a saved run.
 
     Raises:
         ResultsError: it is no run folder, was written by an earlier version, or its recording is damaged.
@@ -163,7 +163,7 @@ def read_front_end(directory: Path) -> SavedFrontEnd:
 
 
 def read_source(directory: Path) -> str | None:
-    """What the sequence of a run folder was opened by; None where that was not written.
+    """The path or name by which the sequence was opened; None where it was not recorded.
 
     Raises:
         ResultsError: it is no run folder, or the file that holds it is damaged.

@@ -1,4 +1,4 @@
-"""Everything that a run leaves behind."""
+"""The result of a run."""
 
 from dataclasses import dataclass
 
@@ -13,7 +13,7 @@ from semslam.types import LedgerEntry, Trajectory
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RunResult:
-    """Everything a run leaves behind.
+    """The result of a run.
 
     Attributes:
         config: the effective settings.
@@ -43,7 +43,7 @@ class RunResult:
 
 
 class PartialRunError(SemslamError):
-    """An error ended a run after its first tracked frame.
+    """An error ended a run after its first tracked frame; it holds the result until then.
 
     Attributes:
         result: what was computed until then, optimised and scored.

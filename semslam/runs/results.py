@@ -1,4 +1,4 @@
-"""The run folder, written and read."""
+"""Writes and reads run folders."""
 
 import csv
 from collections.abc import Sequence
@@ -30,7 +30,7 @@ READ = ("config.yaml", "odometry.txt", "trajectory.txt", "keyframes.txt", "keyfr
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SavedRun:
-    """A run folder, read again.
+    """A run read from its folder.
 
     Attributes:
         directory: where it is.
@@ -137,7 +137,7 @@ def read_run(directory: Path) -> SavedRun:
 
 
 def read_metrics(directory: Path) -> Metrics:
-    """Read what a run measured.
+    """Read the metrics of a run.
 
     Raises:
         ResultsError: it is no run folder, or its metrics are damaged.

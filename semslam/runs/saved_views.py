@@ -1,4 +1,4 @@
-"""A saved run and its sequence together: its keyframes' images at their optimised poses, read again."""
+"""Keyframes of a saved run with their optimised poses and, read from the sequence, their images."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
@@ -46,7 +46,7 @@ class SavedViews:
     keyframes: tuple[PlacedKeyframe, ...]
 
     def between(self, start: float, end: float) -> "SavedViews":
-        """Those of its keyframes whose stamps lie in [start, end), seconds.
+        """The keyframes with stamps in [start, end), seconds.
 
         Raises:
             ResultsError: there is none.
@@ -71,7 +71,7 @@ class SavedViews:
 
 
 def find_images(directory: Path, sequence: str | None = None) -> tuple[Dataset | None, str | None]:
-    """The sequence that a saved run ran on, or None and why it cannot be had.
+    """The sequence of a saved run, or None and the reason why it cannot be read.
 
     Args:
         directory: the run folder.

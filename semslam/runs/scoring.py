@@ -1,4 +1,4 @@
-"""A finished run against ground truth: trajectories, loops, figures."""
+"""Scores a finished run against ground truth: trajectories, loops, metrics."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -29,7 +29,7 @@ from semslam.types import (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scores:
-    """What scoring makes of a run.
+    """The scores of a run.
 
     Attributes:
         odometry: causal trajectory, tracked frames of the odometry's largest map.

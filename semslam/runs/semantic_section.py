@@ -16,7 +16,7 @@ JPEG_QUALITY = 80
 
 
 def semantic_section(directory: Path) -> SemanticSection | None:
-    """What ``semslam map RUN --semantic`` has put into a run folder, or None where it has not been asked for.
+    """The semantic map in a run folder, or None where ``semslam map RUN --semantic`` was not called.
 
     Raises:
         ResultsError: a file of it is damaged.

@@ -131,7 +131,7 @@ class Session:
         self._viewer.loops(LoopScene(self._slam.keyframes[answer.keyframe], answer.labels, loops))
 
     def close(self) -> None:
-        """End what runs beside tracking."""
+        """Stop the reading thread and loop closing."""
         self._slam.close()
 
     def drive(self, states: Iterable[tuple[int, FrameState | None]], progress: Progress, stop: Stop) -> None:

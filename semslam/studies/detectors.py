@@ -1,4 +1,4 @@
-"""Loop detectors compared on a sequence's keyframes against loop truth (the paper's Figure 13)."""
+"""Compares loop detectors on a sequence's keyframes with loop truth (the paper's Figure 13)."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -107,7 +107,7 @@ def keyframe_views(
 
 
 def check_scorable(names: Sequence[str]) -> None:
-    """Find out before long work whether all the detectors can be scored.
+    """Check before long work that all detectors can be scored.
 
     Raises:
         ConfigError: a name is unknown, or is "none", which scores nothing.
@@ -119,7 +119,7 @@ def check_scorable(names: Sequence[str]) -> None:
 
 
 def exhaustive_detector(name: str, config: Config, keyframes: int) -> LoopDetector:
-    """The detector ``name``, set to name every pair of so many keyframes that it scores above 0.
+    """The detector ``name``, set to propose every pair of ``keyframes`` keyframes that it scores above 0.
 
     Raises:
         ConfigError: the name is unknown, or is "none", which scores nothing.

@@ -1,4 +1,4 @@
-"""A saved run's graph under false loops, scored against ground truth."""
+"""Injects false loops into a saved run's graph and scores it against ground truth."""
 
 from collections.abc import Sequence
 from pathlib import Path

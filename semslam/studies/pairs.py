@@ -1,4 +1,4 @@
-"""Same place or hard negative: detectors tried on pairs of frames (the paper's Table 2), of sequences or a folder."""
+"""Classification of frame pairs as same place or hard negative (the paper's Table 2), from sequences or a folder."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -39,7 +39,7 @@ Report = Callable[[str, int, int], None]
 
 @dataclass(frozen=True, slots=True)
 class PairPlan:
-    """What to try detectors on.
+    """The pairs and detectors of a trial.
 
     Attributes:
         sequences: paths of sequences with ground truth.
@@ -58,14 +58,14 @@ class PairPlan:
 
     @property
     def tuning_sequences(self) -> tuple[str, ...]:
-        """The sequences that thresholds come from alone; empty where the sets serve one another."""
+        """Sequences used for thresholds only; empty where each set takes its threshold from the others."""
         alone = len(self.sequences) + len(self.folders) == 1
         return self.tuning or ((TUNING_SCENE,) if alone else ())
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PairTrial:
-    """What came of it.
+    """The result of a trial.
 
     Attributes:
         tested: the judged sets.
@@ -111,7 +111,7 @@ def try_pairs(
 def sequence_pairs(
     path: str, config: Config, every: int, count: int, report: Report = lambda _set, _done, _all: None
 ) -> tuple[str, list[Pair]]:
-    """The sequence's name and its pairs; in a rendered scene light and things change for real.
+    """The sequence's name and its pairs; in a rendered scene light and objects are changed in the scene itself.
 
     Poses of the pairs are relative to the first chosen frame, as those of odometry are.
 

@@ -16,7 +16,7 @@ class DbowConfig(Section):
     """How scores of neighbouring keyframes are grouped."""
 
     group: float = setting(0.35, "keyframes within this time are scored together", unit="s", ge=0)
-    min_score: float = setting(0.04, "score of a candidate", ge=0, le=1)
+    min_score: float = setting(0.04, "score threshold of a candidate", ge=0, le=1)
 
 
 class DbowDetector(RememberingDetector[Bag]):

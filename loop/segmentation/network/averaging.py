@@ -1,4 +1,4 @@
-"""One network out of several that were trained from the same start: the mean of their weights.
+"""Averages the weights of several networks that were trained from the same start.
 
 Such networks lie in one basin of the loss, and their mean is often better than each of them (Wortsman et al.,
 Model soups, ICML 2022); it costs nothing at run time.
@@ -50,7 +50,7 @@ def average(directory: Path, weights: Sequence[Path], config: Config, out: Path)
 
 @torch.no_grad()
 def mean_network(networks: Sequence[DeepLab]) -> DeepLab:
-    """The first network, its every weight now the mean of all networks' weights.
+    """The first network with each weight replaced by the mean over all networks.
 
     Raises:
         ModelError: their decoders are not of one width.

@@ -1,4 +1,4 @@
-"""Weights on disk: float16 state dicts, read with a clear word when they do not fit."""
+"""Weights on disk: float16 state dicts."""
 
 import os
 import pickle
@@ -44,7 +44,7 @@ def load_network(path: Path) -> DeepLab:
 
 
 def save_weights(network: nn.Module, path: Path) -> None:
-    """Write a network's state as float16, whole or not at all."""
+    """Write a network's state as float16, atomically."""
     state = {name: v.half() if v.is_floating_point() else v for name, v in network.state_dict().items()}
     save_atomically(state, path)
 

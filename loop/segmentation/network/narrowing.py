@@ -1,4 +1,4 @@
-"""A narrower decoder out of a trained one: the channels that the others can stand in for are left out.
+"""Prunes the decoder of a trained network: channels that the others can replace are removed.
 
 Channel pruning by reconstruction (He, Zhang and Sun, Channel pruning for accelerating very deep neural networks,
 ICCV 2017), with backward elimination: the layer that reads the channels is fitted anew to the rest.
@@ -37,7 +37,7 @@ def plain_views(photos: Sequence[Photo], size: tuple[int, int]) -> Tensor:
 
 @torch.no_grad()
 def narrow_decoder(network: DeepLab, channels: int, images: Tensor) -> DeepLab:
-    """Return a network whose decoder has ``channels`` in both layers; train it on, for it answers a little worse.
+    """Return a network whose decoder has ``channels`` in both layers; it needs further training to regain its accuracy.
 
     Args:
         network: the trained network with a MobileNetV2.

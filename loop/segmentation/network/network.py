@@ -29,7 +29,7 @@ FEATURE_BLOCK = 12
 
 
 class Encoding(NamedTuple):
-    """What an encoder hands on: ``low`` at 1/4, ``middle`` and ``high`` at 1/16 of the image's size."""
+    """Features from an encoder: ``low`` at 1/4, ``middle`` and ``high`` at 1/16 of the image's size."""
 
     low: Tensor
     middle: Tensor
@@ -95,7 +95,7 @@ class Encoder(nn.Module):
     high_channels: int
 
     def early_layers(self) -> list[nn.Module]:
-        """The layers at half and a quarter of the image's size, which see edges and colours alone."""
+        """The layers at a half and a quarter of the image's size."""
         raise NotImplementedError
 
 
@@ -196,7 +196,7 @@ def build_mobilenet_deeplab(classes: int = 40, decoder_channels: int = DECODER_C
 
 
 def count_parameters(network: nn.Module) -> int:
-    """Number of trained figures in a network."""
+    """Number of trainable parameters of a network."""
     return sum(p.numel() for p in network.parameters())
 
 

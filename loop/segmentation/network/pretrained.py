@@ -1,4 +1,4 @@
-"""Starting weights: MLPerf Mobile's DeepLabv3+ MobileNetV2 trained on 31 ADE20K classes, made fit for training."""
+"""Starting weights: MLPerf Mobile's DeepLabv3+ MobileNetV2, trained on 31 ADE20K classes, converted for training."""
 
 import re
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Aligned Xception-65, DeepLabv3+'s first backbone: what the paper replaces, here so that its speed can be measured.
+"""Aligned Xception-65, the backbone that the paper replaces, for comparing speed.
 
 Chen et al., ECCV 2018, Figure 4. There are no weights for it.
 """
@@ -48,7 +48,7 @@ class XceptionBlock(nn.Module):
         self.shortcut = ConvNorm(inside, c, activate=False) if shortcut == "conv" else nn.Identity()
 
     def forward(self, x: Tensor) -> tuple[Tensor, Tensor]:
-        """Return the block's output and what its second convolution gave."""
+        """Return the block's output and that of its second convolution."""
         middle = self.second(self.first(x))
         out = self.third(middle)
         if self.kind == "conv":

@@ -1,4 +1,4 @@
-"""Segmentations on disk, so that a sweep over settings does not segment an image twice."""
+"""Caches segmentations on disk, so that a sweep does not segment an image twice."""
 
 import hashlib
 import os
@@ -17,7 +17,7 @@ from semslam.types import LabelMap
 
 
 class CachedSegmenter:
-    """Keeps what another segmenter answers, by the content of the image and of the segmenter.
+    """Caches another segmenter's label maps, by the content of the image and the segmenter's fingerprint.
 
     Files are written whole or not at all; one that cannot be read is made anew. Confidences are kept in 255
     steps, and given back so on the first answer too: a run is the same with a warm and a cold cache.
@@ -33,7 +33,7 @@ class CachedSegmenter:
 
     @classmethod
     def from_config(cls, config: Config) -> Self:
-        """Put the segmenter ``segmentation.name`` behind the folder ``segmentation.cache_dir``.
+        """Cache the segmenter ``segmentation.name`` in the folder ``segmentation.cache_dir``.
 
         Raises:
             ConfigError: the folder is not set, the name is unknown or a setting does not fit.
@@ -50,7 +50,7 @@ class CachedSegmenter:
         return self._inner.names
 
     def segment(self, color: UInt8Array, frame_index: int | None = None) -> LabelMap:
-        """Look the labels of an image (H, W, 3) up, or ask for them and keep them."""
+        """Read the labels of an image (H, W, 3) from the cache, or compute and store them."""
         if not self.fingerprint:
             return self._inner.segment(color, frame_index)
         key = hashlib.sha256(self.fingerprint.encode() + str(color.shape).encode() + color.tobytes()).hexdigest()

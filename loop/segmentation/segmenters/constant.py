@@ -1,4 +1,4 @@
-"""One class everywhere: for tests, and to see what a detector makes of no information."""
+"""One class everywhere: for tests and as a baseline without information."""
 
 from typing import Self
 
@@ -11,7 +11,7 @@ from semslam.types import LabelMap
 
 
 class ConstantSegmenter:
-    """Gives every pixel the class "wall", surely."""
+    """Gives every pixel the class "wall" with confidence 1."""
 
     name = "constant"
     names = NYU40_NAMES

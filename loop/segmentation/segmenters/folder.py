@@ -1,4 +1,4 @@
-"""Labels from a folder of images, so that any outside network can serve."""
+"""Labels from a folder of images, such as those of another network."""
 
 from pathlib import Path
 from typing import Self

@@ -1,4 +1,4 @@
-"""The same network through PyTorch: slower, for checking and for machines without ONNX Runtime's speed-ups."""
+"""The same network through PyTorch: slower, for comparison and for machines without a fast ONNX Runtime."""
 
 import hashlib
 from pathlib import Path

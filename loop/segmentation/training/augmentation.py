@@ -1,4 +1,4 @@
-"""Random views of a labelled photo: what a hand-held camera does to an image that a photographer would not take."""
+"""Augmentation: random views of a labelled photo, as from a hand-held camera."""
 
 from dataclasses import dataclass
 from typing import TypeVar
@@ -52,7 +52,7 @@ def paste_patch(
     view: UInt8Array, target: Float32Array, other_view: UInt8Array, other_target: Float32Array,
     rng: np.random.Generator,
 ) -> None:  # fmt: skip
-    """Paste a rectangle of another view, with its targets: things outside their usual surroundings.
+    """Paste a rectangle of another view with its targets, so that objects appear out of context (CutMix).
 
     CutMix (Yun et al., ICCV 2019), for segmentation after French et al. (BMVC 2020). The rectangle covers about a
     tenth to a half of the view.

@@ -1,4 +1,4 @@
-"""How right a segmenter is: mean IoU and accuracies over a split of an NYUv2-layout folder."""
+"""Scores a segmenter: mean IoU and accuracies over a split of a folder in NYUv2's layout."""
 
 import time
 from collections.abc import Callable
@@ -19,7 +19,7 @@ SIZE = (320, 240)
 
 @dataclass(frozen=True, slots=True)
 class SegmentationScore:
-    """Scores over all pixels that are not void in the truth.
+    """Scores over all pixels that are not void in the ground truth.
 
     Attributes:
         miou: mean intersection over union, over the classes present in the truth.
@@ -74,7 +74,7 @@ def evaluate(
 
 
 def confusion_matrix(truth: UInt8Array, labels: UInt8Array) -> IntArray:
-    """Count pixels by true label (rows) and given label (columns), (41, 41); void in the truth is left out."""
+    """Count pixels by true label (rows) and predicted label (columns), (41, 41); true void is left out."""
     known = truth > 0
     pairs = truth[known].astype(np.int64) * (CLASS_COUNT + 1) + labels[known]
     side = CLASS_COUNT + 1
@@ -82,7 +82,7 @@ def confusion_matrix(truth: UInt8Array, labels: UInt8Array) -> IntArray:
 
 
 def score(confusion: IntArray, ms: float = 0.0) -> SegmentationScore:
-    """Turn counts (41, 41) as of ``confusion_matrix`` into scores."""
+    """Scores from a confusion matrix (41, 41)."""
     right = np.diag(confusion)[1:].astype(np.float64)
     true = confusion.sum(axis=1)[1:]
     given = confusion.sum(axis=0)[1:]

@@ -1,4 +1,4 @@
-"""Teaching with photos that have no labels: trained networks say what they believe of them (self-training).
+"""Self-training: trained networks predict soft labels for photos that have none.
 
 Beliefs are kept as probabilities, since a label made of them would drop the rarer classes, of which no network is
 ever sure (Hinton et al., Distilling the knowledge in a neural network, 2015).
@@ -24,7 +24,7 @@ TEACHER_SIZES = ((320, 240), (448, 336))
 
 
 class Teacher:
-    """Averages the answers of several networks to a photo and its mirror image, at several sizes.
+    """Averages the predictions of several networks for a photo and its mirror image, at several sizes.
 
     Args:
         graphs: float graphs of the networks.
@@ -58,7 +58,7 @@ def _softmax(session: onnxruntime.InferenceSession, image: UInt8Array) -> Float3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TaughtPhoto:
-    """A photo and what the teacher believes of it.
+    """A photo with the teacher's soft labels.
 
     Attributes:
         color: (H, W, 3) uint8 RGB.
@@ -74,7 +74,7 @@ class TaughtPhoto:
 def teach(
     teacher: Teacher, photos: Path, folder: Path, report: Callable[[int, int], None] = lambda _done, _total: None
 ) -> list[TaughtPhoto]:
-    """Ask the teacher about every photo of a folder; what it answered once is kept in ``folder``.
+    """Predict soft labels for every photo of a folder; they are cached in ``folder``.
 
     Raises:
         DatasetError: ``photos`` holds no JPEG or PNG image.

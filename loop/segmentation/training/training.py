@@ -1,4 +1,4 @@
-"""Training on NYUv2-layout folders: resumable at any moment, and the same views for the same seed."""
+"""Training on folders in NYUv2's layout: resumable at any step, deterministic for a seed."""
 
 import time
 from collections.abc import Callable
@@ -36,7 +36,7 @@ WEIGHT_LIMITS = (0.3, 4.0)
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """How far a training is: steps done and in all, and the last step's loss."""
+    """Progress of a training: steps done, steps in all, and the last step's loss."""
 
     step: int
     steps: int
@@ -44,7 +44,7 @@ class Progress:
 
 
 def train(directory: Path, config: Config, out: Path, report: Callable[[Progress], None] = lambda _: None) -> Path:
-    """Train the network on ``directory/train.txt``; goes on where a killed run left off.
+    """Train the network on ``directory/train.txt``; resumes a training that was killed.
 
     Writes in ``out``: ``state.pt`` (to resume), ``training.csv`` (step, rate, loss) and ``weights.pt`` (float16
     average of the weights), all current at every save; at the end ``weights.onnx`` (int8, calibrated on photos of
@@ -86,7 +86,7 @@ def class_weights(photos: list[Photo]) -> Float32Array:
 
 
 def taught_photos(settings: TrainingConfig, folder: Path) -> list[TaughtPhoto]:
-    """The unlabelled photos with the teachers' beliefs, kept in ``folder``; none without teachers.
+    """The unlabelled photos with the teachers' soft labels, cached in ``folder``; none without teachers.
 
     Raises:
         ConfigError: there are photos without teachers, or teachers without photos.
@@ -109,7 +109,7 @@ def photos_by_class(photos: list[Photo]) -> list[list[Photo]]:
 
 
 def learning_rate(step: int, steps: int, warmup: float) -> float:
-    """Share of the peak rate: a linear climb, then a cosine to nothing."""
+    """Share of the peak rate: linear warm-up, then a cosine to zero."""
     rise = max(1, round(steps * warmup))
     if step < rise:
         return (step + 1) / rise
@@ -241,7 +241,7 @@ class _Run:
         return network
 
     def finish(self) -> Path:
-        """Save all, and write what is made once: the int8 graph and the curve."""
+        """Save all, and write the int8 graph and the learning curve."""
         self.save()
         write_calibrated(self._averaged(), self.out / "weights.onnx", self.photos, self.size)
         if (self.out / "training.csv").exists():
@@ -249,7 +249,7 @@ class _Run:
         return self.out / "weights.pt"
 
     def resume(self) -> None:
-        """Take up the state of a killed run, if there is one."""
+        """Load the state of a training that was killed, if there is one."""
         path = self.out / "state.pt"
         if not path.exists():
             return

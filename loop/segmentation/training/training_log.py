@@ -1,4 +1,4 @@
-"""The log of a training: a table that any program reads, and its curve."""
+"""The log of a training: a CSV table, and its curve."""
 
 import csv
 from pathlib import Path
@@ -16,7 +16,7 @@ def write_row(path: Path, step: int, rate: float, loss: float) -> None:
 
 
 def read_log(path: Path) -> list[tuple[int, float, float]]:
-    """Rows (step, rate, loss) by step; of a step that was logged twice around a kill, the later one."""
+    """Rows (step, rate, loss) by step; the later one where a resumed training logged a step twice."""
     with path.open(newline="", encoding="utf-8") as file:
         rows = {int(row["step"]): (float(row["rate"]), float(row["loss"])) for row in csv.DictReader(file)}
     return [(step, *rows[step]) for step in sorted(rows)]

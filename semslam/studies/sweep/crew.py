@@ -1,4 +1,4 @@
-"""Who makes the runs: this process, processes of this machine, or the workers of a Dask cluster."""
+"""Executors of runs: this process, processes of this machine, or the workers of a Dask cluster."""
 
 import os
 from collections.abc import Callable, Iterator
@@ -18,14 +18,14 @@ Make = Callable[[Job], Outcome]
 
 
 class Crew(Protocol):
-    """Makes runs, now or later."""
+    """Executes runs."""
 
     def submit(self, job: Job) -> "Future[Outcome]":
-        """Have a run made; the future fails only where the process that makes it dies."""
+        """Schedule a run; the future fails only where its process dies."""
 
 
 class ThisProcess:
-    """Makes each run at once, here.
+    """Executes each run immediately in this process.
 
     Args:
         make: makes a run.
@@ -35,14 +35,14 @@ class ThisProcess:
         self._make = make
 
     def submit(self, job: Job) -> "Future[Outcome]":
-        """Make a run and return it finished."""
+        """Execute a run and return a finished future."""
         future: Future[Outcome] = Future()
         future.set_result(self._make(job))
         return future
 
 
 class Processes:
-    """Processes of this machine (joblib's loky); where one dies, new ones take over.
+    """Processes of this machine (joblib's loky); a process that dies is replaced.
 
     Args:
         count: how many.
@@ -52,7 +52,7 @@ class Processes:
         self._count = count
 
     def submit(self, job: Job) -> "Future[Outcome]":
-        """Have a run made by the next free process."""
+        """Schedule a run on the next free process."""
         from joblib.externals.loky import get_reusable_executor
 
         threads = max((os.cpu_count() or 1) // self._count, 1)
@@ -67,7 +67,7 @@ class Processes:
         return future
 
     def stop(self) -> None:
-        """End the processes, at work or not."""
+        """Terminate the processes, busy or not."""
         from joblib.externals.loky import get_reusable_executor
 
         get_reusable_executor(max_workers=self._count).shutdown(wait=True, kill_workers=True)
@@ -75,7 +75,7 @@ class Processes:
 
 @contextmanager
 def local_crew(count: int) -> Iterator[Crew]:
-    """So many processes of this machine."""
+    """An executor with ``count`` processes of this machine."""
     crew = Processes(count)
     try:
         yield crew
@@ -109,7 +109,7 @@ class _Cluster:
         self._executor = executor
 
     def submit(self, job: Job) -> "Future[Outcome]":
-        """Have a run made by the next free worker."""
+        """Schedule a run on the next free worker."""
         return self._executor.submit(make_run, job)
 
 

@@ -15,7 +15,7 @@ DIED = "The process that made the run died, twice; it may have run out of memory
 
 
 def run_jobs(jobs: Sequence[Job], crew: Crew, report: Report = lambda _outcome, _done, _whole: None) -> list[Outcome]:
-    """Make all runs; those that share a front end wait until one of them has tracked.
+    """Execute all runs; those that share a front end wait until one of them has tracked.
 
     Args:
         jobs: the plan.
@@ -53,7 +53,7 @@ class _Shift:
     alone: set[Case] = field(default_factory=set)
 
     def begin(self, group: _Group) -> None:
-        """Begin a group's first job, or all of them once its front end is there."""
+        """Start a group's first job, or all of them once its front end exists."""
         while group.waiting:
             job = replace(group.waiting.popleft(), recording=group.recording)
             self._submit(job, group)

@@ -1,4 +1,4 @@
-"""Results that were not made here: published ones, and trajectories of other systems scored as ours are."""
+"""Results of other systems: published ones, and trajectories scored like ours."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -38,7 +38,7 @@ class OtherResult:
 
 
 def published_results(suite: Suite) -> list[OtherResult]:
-    """The suite's marks for its sequences."""
+    """The published results of the suite's sequences."""
     return [
         OtherResult(sequence.name, mark.system, mark.ate_cm[sequence.name] / 100, None, None, mark.source, True)
         for sequence in suite.sequences

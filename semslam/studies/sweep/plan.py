@@ -36,7 +36,7 @@ class Case:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Job:
-    """A run that is to be made.
+    """A run to execute.
 
     Attributes:
         case: what is run.
@@ -131,7 +131,7 @@ def group_by_front_end(jobs: Sequence[Job]) -> list[list[Job]]:
 
 
 def find_sequence(path: str, data: Path) -> str:
-    """Where a sequence is: as written, below ``data``, or there under its full TUM name; otherwise as written."""
+    """The path of a sequence: as written, below ``data``, or below ``data`` under its full TUM name."""
     candidates = [Path(path), data / path]
     with contextlib.suppress(DatasetError):
         candidates.append(data / folder_name(path))

@@ -61,7 +61,7 @@ def _sequence(value: object) -> object:
 
 
 class Suite(_Part):
-    """Every combination of what it lists is run.
+    """A suite: every combination of its lists is run.
 
     Attributes:
         name: stands above the tables.
@@ -97,7 +97,7 @@ class Suite(_Part):
         return self
 
     def check_names(self) -> None:
-        """Make sure that each odometry and detector is registered.
+        """Check that each odometry and detector is registered.
 
         Raises:
             ConfigError: one is not; the message lists the known ones.
@@ -109,7 +109,7 @@ class Suite(_Part):
 
 
 def read_suite(place: str, changes: Mapping[str, Any] | None = None) -> Suite:
-    """Read a suite and lay ``changes`` over it.
+    """Read a suite and apply ``changes``.
 
     Args:
         place: a YAML file, or the name of a shipped suite.

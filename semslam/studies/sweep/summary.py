@@ -13,7 +13,7 @@ ALL = "all sequences"
 
 @dataclass(frozen=True, slots=True)
 class Method:
-    """What is compared: everything of a case but the sequence and the repeat."""
+    """A method: a case without its sequence, seed and start."""
 
     odometry: str
     settings: str

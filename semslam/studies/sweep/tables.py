@@ -26,7 +26,7 @@ BRIEF = ("method", "runs", "ATE, cm", "95 % interval", "change by loops, cm", "t
 
 @dataclass(frozen=True, slots=True)
 class SuiteResult:
-    """All that a suite's page shows.
+    """The content of a suite's page.
 
     Attributes:
         name: the suite's.

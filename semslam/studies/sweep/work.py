@@ -1,4 +1,4 @@
-"""One run of a suite, in whichever process it is made."""
+"""Executes one run of a suite."""
 
 from dataclasses import dataclass
 
@@ -21,7 +21,7 @@ from semslam.studies.sweep.plan import Case, Job
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What became of a run.
+    """The outcome of a run.
 
     Attributes:
         case: what was run.
@@ -41,7 +41,7 @@ def _silent(_index: int, _state: object) -> None:
 
 
 def make_run(job: Job, progress: Progress = _silent) -> Outcome:
-    """Make a run and write its folder, unless an earlier call did; a failure is an outcome like any other.
+    """Execute a run and write its folder, unless an earlier call did; a failure is an outcome, not an exception.
 
     Raises:
         KeyboardInterrupt: Ctrl-C, or ``Ended`` by another signal; what was computed is written, and the next call makes
@@ -56,7 +56,7 @@ def make_run(job: Job, progress: Progress = _silent) -> Outcome:
 
 
 def finished(job: Job) -> Metrics | None:
-    """What a run measured that was made before of the same sequence with the same settings, or None."""
+    """The metrics of an earlier run of the same sequence with the same settings, or None."""
     if not job.directory.is_dir():
         return None
     try:
