@@ -26,7 +26,7 @@ class TrainingConfig(Section):
     """How the segmentation network is trained; the size of its input is the segmenter's."""
 
     start: Path | None = Field(None, description="weights to start from: ADE20K state dict or own checkpoint")
-    decoder_channels: int | None = Field(None, gt=0, description="channels of the decoder; fewer than the start's prunes it")
+    decoder_channels: int | None = Field(None, gt=0, description="decoder channels to prune the start to")
     epochs: int = Field(60, gt=0, description="passes over the labelled photos")
     batch: int = Field(8, gt=1, description="views in one step")
     rate: float = Field(1e-3, gt=0, description="peak learning rate of decoder and head")
