@@ -36,7 +36,7 @@ def check_command(
     min_fps: Annotated[float | None, typer.Option(min=0.0, callback=options.finite_or_none)] = None,
     as_json: options.Json = False,
 ) -> None:
-    """Hold a run against limits: Markdown on standard output, exit code 1 where one is not kept."""
+    """Compare a run's metrics with limits: a Markdown table, and exit code 1 where a limit is exceeded."""
     from semslam.runs.checks import QUANTITIES, check_run, checks_markdown
     from semslam.runs.results import read_metrics
 
@@ -59,7 +59,7 @@ COMMANDS = (
     Command(
         "check",
         check_command,
-        "Hold a run against limits: Markdown on standard output, exit code 1 where one is not kept.",
+        "Compare a run's metrics with limits: a Markdown table, and exit code 1 where a limit is exceeded.",
         example(
             "semslam check runs/latest --max-ate 0.05 --max-false-loops 0",
             "semslam check RUN --min-tracked 0.95 >> $GITHUB_STEP_SUMMARY",

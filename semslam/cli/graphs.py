@@ -29,7 +29,7 @@ def ledger_command(
     truth: Annotated[str | None, typer.Option(help="Only true, inaccurate or false ones.")] = None,
     as_json: options.Json = False,
 ) -> None:
-    """Print the loop candidates of a run and what became of each."""
+    """Print the loop candidates of a run, each with its outcome."""
     from semslam.runs.results import read_ledger
     from semslam.types import LoopOutcome
 
@@ -129,7 +129,7 @@ def stress_command(
     seed: options.Seed = None,
     as_json: options.Json = False,
 ) -> None:
-    """Put false loops into a saved run's graph and show what each back end makes of them."""
+    """Inject false loops into a saved run's graph and score each robust strategy."""
     from semslam.backend.analysis.stress import Attack, FalseLoopKind
     from semslam.studies.false_loops import stress_run
 
@@ -188,7 +188,7 @@ COMMANDS = (
     Command(
         "ledger",
         ledger_command,
-        "Print the loop candidates of a run and what became of each.",
+        "Print the loop candidates of a run, each with its outcome.",
         example("semslam ledger runs/latest", "semslam ledger RUN --verdict withdrawn", "semslam ledger RUN --json"),
     ),
     Command(
@@ -204,7 +204,7 @@ COMMANDS = (
     Command(
         "stress",
         stress_command,
-        "Put false loops into a saved run's graph and show what each back end makes of them.",
+        "Inject false loops into a saved run's graph and score each robust strategy.",
         example("semslam stress runs/latest --false-loops 0.3"),
     ),
 )

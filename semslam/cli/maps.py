@@ -57,7 +57,7 @@ def diff_command(
     voxel: Voxel = None,
     out_file: Annotated[Path | None, typer.Option("--out", help="Write the changes as JSON.")] = None,
 ) -> None:
-    """Find the things that moved, went or came between two runs, or two parts of one."""
+    """Find objects that moved, disappeared or appeared between two runs, or two parts of one."""
     from semslam.runs.alignment import align_runs
     from semslam.runs.differences import find_changes, write_changes
     from semslam.runs.files import check_place
@@ -126,7 +126,7 @@ COMMANDS = (
     Command(
         "diff",
         diff_command,
-        "Find the things that moved, went or came between two runs, or two parts of one.",
+        "Find objects that moved, disappeared or appeared between two runs, or two parts of one.",
         example("semslam diff MORNING EVENING", "semslam diff RUN --at 72.7 --out changes.json"),
     ),
     Command(
