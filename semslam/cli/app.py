@@ -14,6 +14,7 @@ from semslam.cli import (
     environment,
     exports,
     graphs,
+    live,
     maps,
     merging,
     models,
@@ -53,7 +54,9 @@ def root(
     """RGB-D SLAM whose loop closures come from semantics."""
 
 
-MODULES = (runs, sweeps, checks, pictures, scores, exports, maps, merging, graphs, models, sensors, environment)
+MODULES = (
+    runs, live, sweeps, checks, pictures, scores, exports, maps, merging, graphs, models, sensors, environment
+)  # fmt: skip
 for module in MODULES:
     for command in module.COMMANDS:
         app.command(command.name, help=command.help, epilog=command.epilog)(command.run)

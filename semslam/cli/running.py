@@ -93,7 +93,7 @@ def _computed(task: Task, place: "RunPlace", stop: "Stop", past: "JournalContent
     dataset, config, recording = task.dataset, task.config, task.recording
     realtime = task.feed is not None
     header = JournalHeader.of(config, task.source, task.plots, task.saved_run, task.command, realtime)
-    frames = len(dataset)
+    frames = len(dataset) or None  # a camera has none yet
     with bar(f"{dataset.name} {config.detector}", frames) as update:
         progress = frame_progress(update, frames)
         return run_journaled(dataset, config, header, place, progress, stop, past, recording, task.viewer, task.feed)

@@ -112,7 +112,7 @@ def run_command(
         reservation = reserved(out_directory, frames)
     with stop_on_signals() as stop:
         with reservation as place:
-            viewer = _viewer(place.directory.name, rerun_file, visualize)
+            viewer = viewer_for(place.directory.name, rerun_file, visualize)
             feed = RealTimeFeed(dataset, rate) if realtime else None
             task = Task(dataset, chosen, source, plots, sys.argv, saved_run, recording, viewer, feed, profile)
             done = carry_out(task, place, stop)
@@ -155,7 +155,7 @@ def _resume(directory: Path, sequence: str | None) -> None:
         end(done, task, stop)
 
 
-def _viewer(name: str, file: Path | None, live: bool) -> "Viewer | None":
+def viewer_for(name: str, file: Path | None, live: bool) -> "Viewer | None":
     """The viewer that is asked for; opened before the run, so that what is missing is known at once."""
     if file is None and not live:
         return None

@@ -45,8 +45,8 @@ class Feed(Protocol):
     def dropped(self) -> tuple[int, ...]:
         """Places of the frames that came too late, or that nobody took in time."""
 
-    def __iter__(self) -> Iterator[Arrival]:
-        """The frames; whoever takes one waits until it is there. What runs beside ends with the iterator."""
+    def arrivals(self) -> Iterator[Arrival]:
+        """The frames, once; whoever takes one waits until it is there. What runs beside ends with the iterator."""
 
 
 class FrameQueue:

@@ -35,7 +35,8 @@ class RealTimeFeed:
         """See ``Feed``."""
         return self._queue.dropped
 
-    def __iter__(self) -> Iterator[Arrival]:
+    def arrivals(self) -> Iterator[Arrival]:
+        """See ``Feed``."""
         first = read(self._dataset, 0, self.stopwatch)
         yield Arrival(0, first, time.perf_counter())
         reader = Thread(target=self._play, args=(time.perf_counter(),), name="semslam-reader", daemon=True)

@@ -94,7 +94,7 @@ class Session:
     def _frames(self) -> Iterator[tuple[int, Frame | DatasetError, float | None]]:
         """Each frame with its place and, where it comes by itself, the moment at which it came."""
         if self._feed is not None:
-            yield from ((arrival.index, arrival.item, arrival.at) for arrival in self._feed)
+            yield from ((arrival.index, arrival.item, arrival.at) for arrival in self._feed.arrivals())
         else:
             for index, item in enumerate(prefetch(self._dataset, stopwatch=self._stopwatch)):
                 yield index, item, None

@@ -49,7 +49,7 @@ def test_waiting_ends_with_the_queue() -> None:
 def test_every_frame_is_handed_out_or_counted(wall: WallDataset) -> None:
     feed = RealTimeFeed(wall, rate=1000)
     taken = []
-    for arrival in feed:
+    for arrival in feed.arrivals():
         taken.append(arrival.index)
         time.sleep(0.004)
     assert taken[0] == 0
@@ -59,24 +59,24 @@ def test_every_frame_is_handed_out_or_counted(wall: WallDataset) -> None:
 
 def test_frames_do_not_come_before_their_time(wall: WallDataset) -> None:
     began = time.perf_counter()
-    last = list(RealTimeFeed(wall, rate=50))[-1]
+    last = list(RealTimeFeed(wall, rate=50).arrivals())[-1]
     assert last.at - began >= (len(wall) - 1) / 50
     assert time.perf_counter() >= last.at
 
 
 def test_what_cannot_be_read_stands_in_its_frames_place() -> None:
-    items = {a.index: a.item for a in RealTimeFeed(WallDataset(unreadable=(0, 5)), rate=20)}
+    items = {a.index: a.item for a in RealTimeFeed(WallDataset(unreadable=(0, 5)), rate=20).arrivals()}
     bad = {index for index, item in items.items() if isinstance(item, DatasetError)}
     assert bad <= {0, 5}
     assert all(isinstance(item, Frame) for index, item in items.items() if index not in bad)
 
 
 def test_the_reading_ends_where_nobody_takes_frames(wall: WallDataset) -> None:
-    feed = iter(RealTimeFeed(wall, rate=5))
+    feed = RealTimeFeed(wall, rate=5).arrivals()
     assert [next(feed).index, next(feed).index] == [0, 1]
     feed.close()  # type: ignore[attr-defined]  # a generator; it waits for the reading thread
 
 
 def test_an_interrupt_while_reading_reaches_who_takes_the_frames() -> None:
     with pytest.raises(KeyboardInterrupt):
-        list(RealTimeFeed(WallDataset(interrupt_at=3), rate=1000))
+        list(RealTimeFeed(WallDataset(interrupt_at=3), rate=1000).arrivals())
