@@ -38,7 +38,7 @@ def read_trajectory(path: str | Path, unit: str | None = None) -> tuple[Trajecto
     Comments and empty lines are skipped. Rows with a value that is not finite, absurdly large, or without a rotation
     are dropped, unsorted rows are sorted, of rows with the same stamp the first is kept. Quaternions are normalised.
     Stamps in milliseconds, microseconds or nanoseconds become seconds. A ninth column of whole numbers (the ids of
-    RTAB-Map's exports) is passed over; decimal commas are read.
+    RTAB-Map's exports) is passed over, and so is a row that names the columns; decimal commas and semicolons are read.
 
     Args:
         path: the text file.
@@ -87,6 +87,12 @@ def _read_table(path: Path, notes: list[str]) -> _Table:
     lines = [line for line in text.splitlines() if line.split("#", 1)[0].strip()]
     if not lines:
         raise TrajectoryError(f"The trajectory {path} holds no poses.")
+    if ";" in lines[0]:
+        notes.append(f"{path.name}: semicolons were read as what separates columns.")
+        lines = [line.replace(";", " ") for line in lines]
+    if len(lines) > 1 and _is_heading(lines[0]):
+        notes.append(f"{path.name}: the first row names the columns.")
+        lines = lines[1:]
     separator = "," if "," in lines[0] else None
     if separator and DECIMAL_COMMAS.match(lines[0]):
         notes.append(f"{path.name}: decimal commas were read as points.")
@@ -102,6 +108,12 @@ def _read_table(path: Path, notes: list[str]) -> _Table:
     if rows.shape[1] != 8:
         raise TrajectoryError(f"{path} is no TUM trajectory ({COLUMNS}): its rows have {rows.shape[1]} columns.")
     return _Table(rows, [_exact(line.split(separator)[0], row[0]) for line, row in zip(lines, rows, strict=True)])
+
+
+def _is_heading(line: str) -> bool:
+    """Whether a row names our columns in our order, such as ``timestamp,tx,ty,tz,qx,qy,qz,qw``; ids may follow."""
+    words = line.replace(",", " ").split()
+    return len(words) in (8, 9) and [word[-1].lower() for word in words[1:8]] == list("xyzxyzw")
 
 
 def _exact(word: str, value: float) -> float:

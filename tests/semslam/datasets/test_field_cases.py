@@ -315,6 +315,29 @@ def test_decimal_commas_are_read(tmp_path: Path) -> None:
     assert "decimal commas" in notes[0]
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "timestamp tx ty tz qx qy qz qw\n1 2 3 4 0 0 0 1\n",
+        "time,x,y,z,qx,qy,qz,qw\n1,2,3,4,0,0,0,1\n",
+        "t;x;y;z;qx;qy;qz;qw\n1,0;2,0;3,0;4,0;0,0;0,0;0,0;1,0\n",
+        "1;2;3;4;0;0;0;1\n",
+    ],
+)
+def test_headings_and_semicolons_are_read_and_noted(tmp_path: Path, text: str) -> None:
+    (tmp_path / "poses.txt").write_text(text)
+    trajectory, notes = read_trajectory(tmp_path / "poses.txt")
+    assert trajectory.timestamps.tolist() == [1]
+    assert trajectory.poses[0, :3, 3].tolist() == [2, 3, 4]
+    assert notes
+
+
+def test_a_heading_in_another_order_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "poses.txt").write_text("timestamp tx ty tz qw qx qy qz\n1 2 3 4 1 0 0 0\n")
+    with pytest.raises(TrajectoryError, match="could not convert"):
+        read_trajectory(tmp_path / "poses.txt")
+
+
 def test_absurd_positions_are_dropped(tmp_path: Path) -> None:
     file = tmp_path / "poses.txt"
     file.write_text("1 0 0 0 0 0 0 1\n2 1e300 0 0 0 0 0 1\n3 0 0 0 1e200 0 0 0\n")
