@@ -24,7 +24,7 @@ from semslam.cli import (
     sensors,
     sweeps,
 )
-from semslam.cli.console import complain, remark
+from semslam.cli.console import complain, remark, shown
 from semslam.errors import SemslamError, SemslamWarning
 from semslam.runtime.stopping import Ended
 
@@ -74,7 +74,8 @@ def _show_warning(
     if issubclass(category, SemslamWarning):
         remark(str(message))
     else:
-        print(warnings.formatwarning(message, category, filename, lineno, line), end="", file=file or sys.stderr)
+        text = shown(warnings.formatwarning(message, category, filename, lineno, line))
+        print(text, end="", file=file or sys.stderr)
 
 
 def main() -> None:

@@ -8,6 +8,7 @@ import typer
 
 from semslam.cli import options
 from semslam.cli.command import Command, example
+from semslam.cli.console import shown
 from semslam.errors import ConfigError
 
 NOT_KEPT = 1
@@ -50,7 +51,9 @@ def check_command(
         kept = [{"name": c.name, "side": c.side, "limit": c.limit, "value": c.value, "kept": c.kept} for c in checks]
         typer.echo(json.dumps({"kept": all(c.kept for c in checks), "checks": kept}))
     else:
-        typer.echo(checks_markdown(f"{metrics.sequence}, {metrics.odometry}, {metrics.detector}", checks), nl=False)
+        typer.echo(
+            shown(checks_markdown(f"{metrics.sequence}, {metrics.odometry}, {metrics.detector}", checks)), nl=False
+        )
     if not all(check.kept for check in checks):
         raise typer.Exit(NOT_KEPT)
 

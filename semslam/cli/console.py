@@ -168,7 +168,7 @@ def text_table(content: "TextTable") -> Table:
     for heading in content.headings:
         table.add_column(heading, justify="left" if heading == content.headings[0] else "right")
     for cells in content.rows:
-        table.add_row(*map(Text, cells))
+        table.add_row(*(Text(shown(cell)) for cell in cells))
     table.caption = "\n".join(content.notes) or None
     return table
 

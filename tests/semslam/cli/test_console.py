@@ -1,13 +1,19 @@
 """What commands print while they work, and how they name things."""
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
-from semslam.cli.console import every_nth
+from semslam.cli.app import _show_warning
+from semslam.cli.console import complain, every_nth, metrics_table, out, remark, text_table
 from semslam.cli.options import completer
 from semslam.cli.progress import progress_lines
-from tests.conftest import Call
+from semslam.config import Config
+from semslam.eval.report.tables import Table
+from semslam.runs.pipeline import run
+from semslam.runs.results import write_run
+from tests.conftest import Call, WallDataset
 
 
 @pytest.mark.parametrize(
@@ -44,3 +50,26 @@ def test_help_names_detectors_and_odometries(semslam: Call) -> None:
     text = semslam("run", "--help").out
     assert "semantic-paper" in text
     assert "feature_map" in text
+
+
+EVIL = "\x1b]0;owned\x07\x9b31m\u202e"
+
+
+def test_no_control_character_of_a_file_reaches_the_terminal(
+    semslam: Call, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    wall = WallDataset(name=f"wall{EVIL}")
+    result = run(wall, Config(detector="none"))
+    out.print(metrics_table([result.metrics], result.metrics.sequence))
+    out.print(text_table(Table(EVIL, ("a", EVIL), ((EVIL, EVIL),), (EVIL,))))
+    out.print(f"Results: {EVIL}")
+    complain(EVIL)
+    remark(EVIL)
+    _show_warning(EVIL, UserWarning, EVIL, 1)
+    progress_lines(EVIL, 2, "frames", iter([0.0, 20.0]).__next__)(1, None)
+    printed = capsys.readouterr()
+    write_run(result, wall, tmp_path / "run", plots=False)
+    checked = semslam("check", tmp_path / "run", "--max-maps", 1)
+    for text in (printed.out, printed.err, checked.out):
+        assert "owned" in text
+        assert all(character.isprintable() for character in text.replace("\n", ""))
