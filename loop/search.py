@@ -100,7 +100,8 @@ class LoopSearch:
     def find(self, keyframe: Keyframe, frame: Frame, labels: LabelMap | None = None) -> list[Verification]:
         """Look for a place without taking the keyframe in; arguments and result are those of ``search``."""
         candidates = self._detector.query(self._view(keyframe, frame, labels))
-        return [self._verifier.verify(keyframe, self._keyframes[one.match], one) for one in candidates]
+        known = [*self._keyframes, keyframe]
+        return [self._verifier.verify(*ends_of(candidate, known), candidate) for candidate in candidates]
 
     def forget(self, ids: Collection[int]) -> None:
         """Propose these keyframes no more, and free what was kept of them.

@@ -1,6 +1,7 @@
 """Loops between object submaps: places known again from another side, in other light, after things were moved."""
 
 from collections import deque
+from collections.abc import Collection
 from typing import Self
 
 import numpy as np
@@ -8,10 +9,11 @@ import numpy as np
 from semslam.config import Config, LoopConfig
 from semslam.errors import ConfigError
 from semslam.geometry.se3 import invert, transform_points
+from semslam.loop.detector import Arrays
 from semslam.loop.detectors.common.backbone import Backbone
 from semslam.loop.detectors.common.growing import GrowingArray
 from semslam.loop.detectors.common.memo import LastView
-from semslam.loop.detectors.common.timeline import Timeline
+from semslam.loop.detectors.common.remembering import RememberingDetector
 from semslam.loop.detectors.objects.labelled import GROUP_COUNT, GROUP_LIST, LabelledCloud, label_cloud
 from semslam.loop.detectors.objects.matching import SubmapMatch, match_submaps
 from semslam.loop.detectors.objects.settings import ObjectsConfig
@@ -31,7 +33,7 @@ LOOK_CHANNELS, LOOK_DIMENSIONS = 96, 24
 """The encoder's middle features, and how many random directions of them are kept."""
 
 
-class ObjectsDetector:
+class ObjectsDetector(RememberingDetector[Submap]):
     """Submaps of objects and walls, matched by class, look and place.
 
     The clouds of the keyframes of the last few metres are laid together in odometry's frame, their classes are counted
@@ -46,14 +48,13 @@ class ObjectsDetector:
     Settings = ObjectsConfig
 
     def __init__(self, backbone: Backbone, config: ObjectsConfig, loops: LoopConfig) -> None:
-        self._backbone, self._config, self._loops = backbone, config, loops
-        self._timeline = Timeline(loops, config.min_score)
+        super().__init__(loops, config.min_score)
+        self._backbone, self._config = backbone, config
         self._recent: deque[LabelledCloud] = deque()
-        self._submaps: list[Submap] = []
-        self._contents = GrowingArray(np.float32, (3 * GROUP_COUNT,))
         rng = np.random.default_rng(0)
         self._directions = np.linalg.qr(rng.normal(size=(LOOK_CHANNELS, LOOK_DIMENSIONS)))[0].astype(np.float32)
-        self._described = LastView(self._describe)
+        self._cloud = LastView(self._label)
+        self._clear()
 
     @classmethod
     def from_config(cls, config: Config) -> Self:
@@ -72,40 +73,56 @@ class ObjectsDetector:
         """
         if not len(self._timeline):
             return []
-        submap = self._described(view)[1]
-        matches = {at: match_submaps(submap, self._submaps[at], self._config) for at in self._shortlist(view, submap)}
+        submap = self._look(view)
+        matches = {at: match_submaps(submap, self._looks[at], self._config) for at in self._shortlist(view, submap)}
         scores = np.zeros(len(self._timeline))
         for at, found in matches.items():
             scores[at] = 0.0 if found is None else found.score
         candidates = []
         for at in self._timeline.best(view.keyframe, scores):
-            found = matches[at]
-            assert found is not None
-            candidates.append(self._candidate(view, submap, self._submaps[at], found))
+            match = matches[at]
+            assert match is not None
+            candidates.append(self._candidate(view, submap, at, match))
         return candidates
 
     def add(self, view: KeyframeView) -> None:
-        """Remember the view's submap."""
-        cloud, submap = self._described(view)
+        """Remember the view's submap, and its cloud for the submaps of the next keyframes."""
+        super().add(view)
+        cloud = self._cloud(view)
         self._recent = deque([*self._window(view.keyframe, cloud.travelled), cloud])
-        self._submaps.append(submap)
-        self._contents.append(submap.content[None])
-        self._timeline.add(view.keyframe)
 
-    def _describe(self, view: KeyframeView) -> tuple[LabelledCloud, Submap]:
+    def forget(self, ids: Collection[int]) -> None:
+        """See ``Remembering``; submaps that a forgotten keyframe has become part of keep what it saw."""
+        super().forget(ids)
+        self._recent = deque(cloud for cloud in self._recent if cloud.keyframe.id not in ids)
+
+    def _clear(self) -> None:
+        self._contents = GrowingArray(np.float32, (3 * GROUP_COUNT,))
+
+    def _enter(self, look: Submap) -> None:
+        self._contents.append(look.content[None])
+
+    def _to_arrays(self, look: Submap) -> Arrays:
+        return look.to_arrays()
+
+    def _from_arrays(self, arrays: Arrays) -> Submap:
+        return Submap.from_arrays(arrays)
+
+    def _describe(self, view: KeyframeView) -> Submap:
+        cloud = self._cloud(view)
+        return build_submap([*self._window(view.keyframe, cloud.travelled), cloud], self._config)
+
+    def _label(self, view: KeyframeView) -> LabelledCloud:
         if view.labels is None:
             raise ConfigError(f"The detector '{self.name}' needs a segmentation, and none came with the keyframe.")
         travelled = 0.0
         if self._recent:
             last = self._recent[-1]
-            travelled = last.travelled + float(
-                np.linalg.norm(view.keyframe.T_odom_cam[:3, 3] - last.keyframe.T_odom_cam[:3, 3])
-            )
+            step = view.keyframe.T_odom_cam[:3, 3] - last.keyframe.T_odom_cam[:3, 3]
+            travelled = last.travelled + float(np.linalg.norm(step))
         middle = self._backbone.encode(view.color).middle
         looks: Float32Array = middle.reshape(-1, LOOK_CHANNELS) @ self._directions
-        cloud = label_cloud(view, looks, middle.shape[:2], self._config.max_depth, travelled)
-        window = [*self._window(view.keyframe, travelled), cloud]
-        return cloud, build_submap(window, self._config)
+        return label_cloud(view, looks, middle.shape[:2], self._config.max_depth, travelled)
 
     def _window(self, keyframe: Keyframe, travelled: float) -> list[LabelledCloud]:
         """Recent clouds that belong to the submap of a new keyframe."""
@@ -138,9 +155,18 @@ class ObjectsDetector:
                 chosen.append(at)
         return chosen
 
-    def _candidate(self, view: KeyframeView, query: Submap, match: Submap, found: SubmapMatch) -> LoopCandidate:
+    def _members(self, submap: Submap, newest: float) -> tuple[int, ...]:
+        """Ids of the remembered keyframes of a submap whose newest one has this time stamp."""
+        stamps = self._timeline.stamps
+        inside = np.flatnonzero((stamps >= submap.start) & (stamps <= newest))
+        return tuple(self._timeline.id_at(int(at)) for at in inside)
+
+    def _candidate(self, view: KeyframeView, query: Submap, at: int, found: SubmapMatch) -> LoopCandidate:
+        match, anchor = self._looks[at], view.keyframe.id
         T = match.T_cam_level @ found.T_match_query @ invert(query.T_cam_level)
-        guess = SubmapGuess(tuple(map(tuple, T.tolist())), query.keyframes, match.keyframes)
+        ours = tuple(i for i in self._members(query, view.keyframe.timestamp) if i != anchor)
+        theirs = self._members(match, float(self._timeline.stamps[at]))
+        guess = SubmapGuess(tuple(map(tuple, T.tolist())), (*ours, anchor), theirs)
         objects = tuple(
             ObjectPair(
                 _group_name(int(query.objects.groups[i])),
@@ -152,7 +178,7 @@ class ObjectsDetector:
         figures = {"matched_objects": float(len(found.objects)), "matched_walls": float(len(found.walls))}
         labels = tuple(sorted({pair.label for pair in objects}))
         evidence = LoopEvidence(labels, figures=figures, objects=objects)
-        return LoopCandidate(query.anchor, match.anchor, found.score, self.name, evidence, guess)
+        return LoopCandidate(anchor, self._timeline.id_at(at), found.score, self.name, evidence, guess)
 
 
 def _group_name(group: int) -> str:

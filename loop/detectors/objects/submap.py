@@ -2,12 +2,14 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 import numpy.typing as npt
 
 from semslam.geometry.se3 import Float32Array, FloatArray, invert, transform_points
 from semslam.geometry.voxels import VoxelTable, voxel_cells
+from semslam.loop.detector import Arrays
 from semslam.loop.detectors.objects.labelled import FIRST_THING, FLOOR, GROUP_COUNT, VOID, LabelledCloud
 from semslam.loop.detectors.objects.settings import ObjectsConfig
 from semslam.loop.detectors.objects.upright import find_up, level_frame
@@ -19,6 +21,8 @@ HEIGHTS = (0.6, 1.4)
 """Metres above the floor between low, middle and high."""
 CAMERA_HEIGHT = 1.4
 """Metres that the camera is taken to be above a floor that was not seen."""
+THING_COLUMNS = ("centroids", "extents", "sizes", "groups", "classes", "looks")
+WALL_COLUMNS = ("azimuths", "offsets", "starts", "ends", "areas")
 LEVEL = 0.9
 """Least vertical component of a level surface's normal."""
 
@@ -52,10 +56,8 @@ class Submap:
     """What is kept of the surroundings of a keyframe.
 
     Attributes:
-        anchor: id of the keyframe.
-        keyframes: ids of all keyframes in it, the anchor the last.
-        start: time stamp of the oldest, seconds.
-        T_cam_level: (4, 4) pose of the level frame in the anchor's camera.
+        start: time stamp of the oldest keyframe in it, seconds.
+        T_cam_level: (4, 4) pose of the level frame in the newest keyframe's camera.
         floor: height of the floor in the level frame, metres; NaN where none was seen.
         objects: things.
         walls: vertical planes.
@@ -63,8 +65,6 @@ class Submap:
         content: (3 G,) float32 how much there is of things of each group, low, at middle height and high.
     """
 
-    anchor: int
-    keyframes: tuple[int, ...]
     start: float
     T_cam_level: FloatArray
     floor: float
@@ -73,16 +73,36 @@ class Submap:
     azimuths: Int8Array
     content: Float32Array
 
-    @property
-    def nbytes(self) -> int:
-        """Bytes of its arrays."""
+    def to_arrays(self) -> Arrays:
+        """All of it by name."""
         things, walls = self.objects, self.walls
-        arrays = (
-            things.centroids, things.extents, things.sizes, things.groups, things.classes, things.looks,
-            walls.azimuths, walls.offsets, walls.starts, walls.ends, walls.areas, self.azimuths, self.T_cam_level,
-            self.content,
-        )  # fmt: skip
-        return sum(array.nbytes for array in arrays) + 8 * len(self.keyframes)
+        return {
+            "start": np.array([self.start]),
+            "T_cam_level": self.T_cam_level,
+            "floor": np.array([] if np.isnan(self.floor) else [self.floor]),
+            **{f"objects_{name}": getattr(things, name) for name in THING_COLUMNS},
+            **{f"walls_{name}": getattr(walls, name) for name in WALL_COLUMNS},
+            "azimuths": self.azimuths,
+            "content": self.content,
+        }
+
+    @classmethod
+    def from_arrays(cls, arrays: Arrays) -> Self:
+        """The reverse.
+
+        Raises:
+            KeyError, ValueError: they are not those of a submap.
+        """
+        things = Objects(*(np.asarray(arrays[f"objects_{name}"]) for name in THING_COLUMNS))
+        walls = Walls(*(np.asarray(arrays[f"walls_{name}"]) for name in WALL_COLUMNS))
+        content, floor, (start,) = np.asarray(arrays["content"]), np.asarray(arrays["floor"]), arrays["start"]
+        whole = len({len(getattr(things, name)) for name in THING_COLUMNS}) == 1
+        whole &= len({len(getattr(walls, name)) for name in WALL_COLUMNS}) == 1
+        if not whole or content.shape != (3 * GROUP_COUNT,):
+            raise ValueError("no submap")
+        T = np.asarray(arrays["T_cam_level"], dtype=np.float64).reshape(4, 4)
+        height = float(floor[0]) if len(floor) else float("nan")
+        return cls(float(start), T, height, things, walls, np.asarray(arrays["azimuths"]), content)
 
 
 def build_submap(clouds: Sequence[LabelledCloud], config: ObjectsConfig) -> Submap:
@@ -110,8 +130,6 @@ def build_submap(clouds: Sequence[LabelledCloud], config: ObjectsConfig) -> Subm
     ground = -CAMERA_HEIGHT if np.isnan(floor) else floor
     things = _objects(voxel_cells(table.keys), centres, winners, votes, rows, clouds, config)
     return Submap(
-        newest.id,
-        tuple(cloud.keyframe.id for cloud in clouds),
         clouds[0].keyframe.timestamp,
         invert(newest.T_odom_cam) @ T_odom_level,
         floor,

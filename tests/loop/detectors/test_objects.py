@@ -72,7 +72,7 @@ def test_a_room_has_floor_walls_and_things(views: list[KeyframeView]) -> None:
     assert len(submap.walls) >= 3
     kinds = {GROUP_LIST[group] for group in submap.objects.groups}
     assert {"table", "storage"} <= kinds
-    assert submap.nbytes <= LIMIT_BYTES
+    assert sum(array.nbytes for array in submap.to_arrays().values()) <= LIMIT_BYTES
     again = submap_of(views)
     assert again.objects.centroids.tobytes() == submap.objects.centroids.tobytes()
 
@@ -105,7 +105,7 @@ def furnished(T: FloatArray, seed: int, objects: int = 12) -> Submap:
         table[1 + k % 2, int(np.floor((angle + np.pi) / (2 * np.pi) * BINS)) % BINS] = lengths[k]
     columns = (angles + np.pi, distances - normals @ T[:2, 3], -along - lengths, lengths - along, 8 * lengths)
     return Submap(
-        0, (0,), 0.0, np.eye(4), -1.3 + T[2, 3],
+        0.0, np.eye(4), -1.3 + T[2, 3],
         Objects(
             world.astype(np.float32), np.ones((objects, 2), np.float32), np.full(objects, 50, np.float32),
             groups.astype(np.uint8), quantised(np.eye(GROUP_COUNT)[groups]), quantised(rng.normal(size=(objects, 8))),
@@ -165,3 +165,13 @@ def test_submaps_of_a_loop_share_no_keyframe(views: list[KeyframeView]) -> None:
             proposed += 1
         detector.add(view)
     assert proposed
+
+
+def test_a_damaged_submap_is_refused() -> None:
+    arrays = dict(furnished(np.eye(4), 0).to_arrays())
+    assert Submap.from_arrays(arrays).floor == pytest.approx(-1.3)
+    with pytest.raises(ValueError, match="submap"):
+        Submap.from_arrays(arrays | {"objects_sizes": np.zeros(3)})
+    del arrays["content"]
+    with pytest.raises(KeyError):
+        Submap.from_arrays(arrays)
