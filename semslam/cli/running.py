@@ -77,26 +77,27 @@ def carry_out(task: Task, place: "RunPlace", stop: "Stop", past: "JournalContent
     except ResultsError as error:
         # Hours of tracking must not die with a full disk: show what was found, and keep the journal.
         out.print(metrics_table([result.metrics], task.dataset.name))
-        raise ResultsError(
-            f"{error} The run is finished, but could not be saved; go on by semslam run --resume {place.directory}."
-        ) from error
+        kept = f"; go on by semslam run --resume {place.directory}" if task.feed is None else ""
+        raise ResultsError(f"{error} The run is finished, but could not be saved{kept}.") from error
     remarks(result.notes)
     reason = shortfall(result.metrics, result.slam.keyframes)
     return Done(place.directory, result.metrics, result.profile, result.metrics.interrupted, failure, reason)
 
 
 def _computed(task: Task, place: "RunPlace", stop: "Stop", past: "JournalContent | None") -> "RunResult":
-    """Compute a run, with a journal of it beside the run folder."""
+    """Compute a run, with a journal beside the run folder unless its frames do not come again."""
     from semslam.runs.journal import JournalHeader
     from semslam.runs.journaled import run_journaled
+    from semslam.runs.pipeline import run
 
     dataset, config, recording = task.dataset, task.config, task.recording
-    realtime = task.feed is not None
-    header = JournalHeader.of(config, task.source, task.plots, task.saved_run, task.command, realtime)
     frames = len(dataset) or None  # a camera has none yet
     with bar(f"{dataset.name} {config.detector}", frames) as update:
         progress = frame_progress(update, frames)
-        return run_journaled(dataset, config, header, place, progress, stop, past, recording, task.viewer, task.feed)
+        if task.feed is not None:
+            return run(dataset, config, progress, task.viewer, stop, feed=task.feed)
+        header = JournalHeader.of(config, task.source, task.plots, task.saved_run, task.command)
+        return run_journaled(dataset, config, header, place, progress, stop, past, recording, task.viewer)
 
 
 def show(done: Done, task: Task) -> None:

@@ -10,7 +10,7 @@ from semslam.cli import options
 from semslam.cli.command import Command, example
 from semslam.cli.console import remark
 from semslam.cli.running import Task, carry_out, end, show
-from semslam.errors import ConfigError, ResultsError
+from semslam.errors import ConfigError
 
 if TYPE_CHECKING:
     from semslam.runs.recording import SavedFrontEnd
@@ -137,8 +137,6 @@ def _resume(directory: Path, sequence: str | None) -> None:
         with reopened(directory) as place:
             past = read_journal(place.work / JOURNAL)
             header = past.header
-            if header.realtime:
-                raise ResultsError(f"The run in {directory} was made in real time, which does not come again.")
             settings = place.work / "config.yaml"
             settings.write_text(header.config, encoding="utf-8")
             config = load_saved_config(settings)

@@ -51,7 +51,6 @@ class JournalHeader:
         plots: whether pictures are drawn.
         saved_run: the run whose motions are repeated, or None.
         command: the command line.
-        realtime: whether its frames came at their own time.
         version: of semslam.
     """
 
@@ -60,7 +59,6 @@ class JournalHeader:
     plots: bool
     saved_run: str | None
     command: tuple[str, ...]
-    realtime: bool = False
     version: str = __version__
 
     @classmethod
@@ -71,12 +69,11 @@ class JournalHeader:
         plots: bool,
         saved_run: Path | None,
         command: Sequence[str],
-        realtime: bool = False,
     ) -> Self:
         """The header of a run; places are written in full, for it may be gone on with from another folder."""
         whole = str(Path(source).resolve()) if Path(source).exists() else source
         saved = None if saved_run is None else str(saved_run.resolve())
-        return cls(config.dump(), whole, plots, saved, tuple(command), realtime)
+        return cls(config.dump(), whole, plots, saved, tuple(command))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -22,6 +22,7 @@ from semslam.runs.recording import RecordedFrame, Recording, checksum
 from semslam.runs.result import PartialRunError, RunResult
 from semslam.runs.scoring import Scores, score_run
 from semslam.runs.sensor import CalibratedSequence, needs_timing
+from semslam.runtime.garbage import loaded_objects_left_alone
 from semslam.runtime.stopping import Stop
 from semslam.runtime.stopwatch import Stopwatch
 from semslam.runtime.workers import WorkerKind
@@ -94,7 +95,8 @@ class Session:
     def _frames(self) -> Iterator[tuple[int, Frame | DatasetError, float | None]]:
         """Each frame with its place and, where it comes by itself, the moment at which it came."""
         if self._feed is not None:
-            yield from ((arrival.index, arrival.item, arrival.at) for arrival in self._feed.arrivals())
+            with loaded_objects_left_alone():
+                yield from ((arrival.index, arrival.item, arrival.at) for arrival in self._feed.arrivals())
         else:
             for index, item in enumerate(prefetch(self._dataset, stopwatch=self._stopwatch)):
                 yield index, item, None
