@@ -11,8 +11,13 @@ from enum import StrEnum
 from typing import Any
 
 import matplotlib.style
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import LineCollection, PathCollection
 from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties, findfont
+from matplotlib.lines import Line2D
 
 from semslam.errors import ConfigError
 from semslam.types import LedgerEntry, LoopJudgement, LoopOutcome
@@ -179,9 +184,40 @@ def render(draw: Callable[[Figure], None], size: tuple[float, float], settings: 
     with matplotlib.style.context(STYLE | fonts, after_reset=True):
         figure = Figure(figsize=settings.size or size, dpi=DPI, layout="constrained")
         draw(figure)
+        if settings.size is not None and settings.size[0] < size[0]:
+            _thin(figure, settings.size[0] / size[0])
         buffer = io.BytesIO()
         figure.savefig(buffer, format=settings.format.value, metadata=_METADATA[settings.format])
     return buffer.getvalue()
+
+
+def legend_below(figure: Figure, axes: Axes, columns: int) -> None:
+    """Explain what the axes show in a legend below them, in as many columns as the picture is wide enough for.
+
+    Args:
+        figure: the picture.
+        axes: hold what is explained.
+        columns: maximum number.
+    """
+    handles, labels = axes.get_legend_handles_labels()
+    renderer = FigureCanvasAgg(figure).get_renderer()  # type: ignore[no-untyped-call]
+    for count in range(columns, 0, -1):
+        legend = figure.legend(handles, labels, loc="outside lower center", ncols=count)
+        if count == 1 or legend.get_window_extent(renderer).width <= figure.bbox.width:
+            return
+        legend.remove()
+
+
+def _thin(figure: Figure, scale: float) -> None:
+    """Make lines and markers as much thinner as the picture is smaller than its own size; texts keep theirs."""
+    for line in figure.findobj(Line2D):
+        line.set(linewidth=scale * line.get_linewidth(), markersize=scale * line.get_markersize())
+        line.set_markeredgewidth(scale * line.get_markeredgewidth())
+    for lines in figure.findobj(LineCollection):
+        lines.set_linewidth((scale * np.atleast_1d(lines.get_linewidth())).tolist())
+    for points in figure.findobj(PathCollection):
+        points.set_sizes(scale**2 * np.asarray(points.get_sizes()))
+        points.set_linewidth((scale * np.atleast_1d(points.get_linewidth())).tolist())
 
 
 def _check_font(name: str) -> None:

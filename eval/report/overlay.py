@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from semslam.errors import TrajectoryError
 from semslam.eval.report.drawing import AXES, ErrorCurve, Path, broken, plane
 from semslam.eval.report.plots import view_size
-from semslam.eval.style import PLAIN, SERIES, TRUTH, PictureSettings, render
+from semslam.eval.style import PLAIN, SERIES, TRUTH, PictureSettings, legend_below, render
 from semslam.eval.trajectory import align, position_errors
 from semslam.types import Trajectory
 
@@ -99,7 +99,7 @@ def _draw_paths(figure: Figure, shown: Sequence[Path], title: str) -> None:
         )  # fmt: skip
     axes.set(xlabel=f"{AXES[across]} [m]", ylabel=f"{AXES[up]} [m]", title=title, aspect="equal")
     axes.set_adjustable("datalim")
-    figure.legend(loc="outside lower center", ncols=4)
+    legend_below(figure, axes, 4)
 
 
 def _draw_errors(figure: Figure, curves: Sequence[ErrorCurve], start: float, title: str) -> None:
@@ -113,4 +113,4 @@ def _draw_errors(figure: Figure, curves: Sequence[ErrorCurve], start: float, tit
     axes.set(xlabel="time [s]", ylabel="position error [cm]", title=title)
     axes.set_ylim(bottom=0)
     axes.margins(x=0.01)
-    figure.legend(loc="outside lower center", ncols=2)
+    legend_below(figure, axes, 2)

@@ -9,7 +9,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from semslam.eval.report.drawing import AXES, RunDrawing, aligned, broken, error_curves, loop_ends, paths, plane
-from semslam.eval.style import FALSE, PLAIN, REJECTED, PictureSettings, by_look, render
+from semslam.eval.style import FALSE, PLAIN, REJECTED, PictureSettings, by_look, legend_below, render
 from semslam.geometry.se3 import FloatArray
 from semslam.types import Trajectory
 
@@ -67,7 +67,7 @@ def draw_top_view(figure: Figure, run: RunDrawing) -> None:
         axes.plot(*point, marker, ms=7, mfc="white", mec="#222222", mew=1.5, zorder=8, ls="", label=label)
     axes.set(xlabel=f"{AXES[across]} [m]", ylabel=f"{AXES[up]} [m]", title=run.title, aspect="equal")
     axes.set_adjustable("datalim")
-    figure.legend(loc="outside lower center", ncols=3)
+    legend_below(figure, axes, 3)
 
 
 def draw_axes(figure: Figure, run: RunDrawing) -> None:
@@ -86,7 +86,7 @@ def draw_axes(figure: Figure, run: RunDrawing) -> None:
     rows[0].set_title(run.title)
     rows[2].set_xlabel("time [s]")
     figure.align_ylabels(rows)
-    figure.legend(*rows[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    legend_below(figure, rows[0], 3)
 
 
 def draw_errors(figure: Figure, run: RunDrawing) -> None:
@@ -109,8 +109,7 @@ def draw_errors(figure: Figure, run: RunDrawing) -> None:
     for strip in strips:
         _draw_strip(strip, run)
     (strips or [upper])[-1].set_xlabel("time [s]")
-    handles, labels = figure.axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=2)
+    legend_below(figure, upper, 2)
 
 
 def draw_timeline(figure: Figure, run: RunDrawing) -> None:

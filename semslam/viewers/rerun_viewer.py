@@ -34,7 +34,7 @@ FRUSTUM = 0.25
 """Metres from the camera's centre at which its image is drawn."""
 WAITING = 64
 """Keyframes whose images are kept until their labels come; without a loop detector none come."""
-NODES = NodeConfig(min_area=0.002, cluster_radius=0.0)
+NODES = NodeConfig(min_area=0.005, cluster_radius=0.0)
 """Blocks that are shown as nodes; merging dense ones takes longer than everything else that is shown."""
 
 

@@ -75,6 +75,23 @@ def test_size_title_and_font_are_those_asked_for() -> None:
     assert pictures != draw_run(RUN, replace(settings, font="DejaVu Sans"))
 
 
+def test_nothing_is_cut_off_in_a_column_of_a_paper() -> None:
+    settings = PictureSettings(size=(3.2, 2.6), font_size=8.0)
+    runs = [NamedTrajectory(name, circle()) for name in ("semantic", "fused", "thumbnail", "none at all")]
+    for png in (*draw_run(RUN, settings).values(), *draw_comparison(runs, circle(), "", settings).values()):
+        image = decoded(png)
+        assert (image[:, [0, -1]] == 255).all()
+        assert (image[-1] == 255).all()
+
+
+def test_lines_are_thinner_in_a_smaller_picture() -> None:
+    def share(settings: PictureSettings) -> float:
+        image = decoded(draw_run(replace(RUN, loops=()), settings)["axes"]).astype(int)
+        return float((np.abs(image - (178, 114, 0)).max(axis=2) < 60).mean())
+
+    assert share(PictureSettings(size=(4.5, 3.0))) < 1.4 * share(PictureSettings())
+
+
 def test_a_font_that_is_not_there_is_one_sentence() -> None:
     with pytest.raises(ConfigError, match="'No Such Font' is not installed"):
         draw_run(RUN, PictureSettings(font="No Such Font"))
