@@ -51,6 +51,8 @@ def draw_intervals(groups: Sequence[tuple[str, Sequence[Bar]]]) -> bytes:
             ends = [end for bar in bars for end in (bar.mean, bar.high, bar.alone) if end is not None]
             panel.set_xlim(0, 1.05 * max(ends) or 1.0)
             panel.set_title(title)
-        panels[-1].set_xlabel("ATE RMSE, cm (bar: odometry alone; line: 95 % interval of the mean; diamond: not ours)")
+        figure.supxlabel(
+            "ATE RMSE, cm (bar: odometry alone; line: 95 % interval of the mean; diamond: not ours)", fontsize="medium"
+        )
 
     return render(draw, (WIDTH_INCHES, sum(heights)))

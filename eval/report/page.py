@@ -12,6 +12,7 @@ from semslam.eval.report.content import Fact, RunReport
 from semslam.eval.report.curves import error_lines, view_of
 from semslam.eval.report.drawing import aligned, error_curves, paths
 from semslam.eval.report.overlay import NamedTrajectory, compared_errors, compared_paths
+from semslam.eval.report.tables import Table
 from semslam.eval.report.verdict import Verdict
 from semslam.types import Trajectory
 
@@ -56,6 +57,25 @@ class ComparisonReport:
     origin: tuple[Fact, ...] = ()
 
 
+@dataclass(frozen=True, slots=True)
+class SuiteReport:
+    """Everything on the page of a suite of runs.
+
+    Attributes:
+        title: the suite's name.
+        count: how many runs there were, in words.
+        picture: of all methods, as a data URI, or None.
+        tables: one for each sequence, and what there is besides.
+        suite: its description as YAML.
+    """
+
+    title: str
+    count: str
+    picture: str | None
+    tables: tuple[Table, ...]
+    suite: str
+
+
 def make_report(report: RunReport) -> str:
     """A run's page as HTML; texts are escaped.
 
@@ -93,6 +113,11 @@ def make_comparison(report: ComparisonReport) -> str:
         "images": {},
     }
     return _render("comparison.html.j2", title=report.title, report=report, data=data)
+
+
+def make_suite(report: SuiteReport) -> str:
+    """A suite's page as HTML; texts are escaped."""
+    return _environment().get_template("suite.html.j2").render(report=report) + "\n"
 
 
 @cache

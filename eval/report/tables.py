@@ -1,9 +1,7 @@
-"""A table of texts as Markdown, LaTeX and HTML."""
+"""A table of texts as Markdown and LaTeX."""
 
 import re
-from collections.abc import Sequence
 from dataclasses import dataclass
-from html import escape
 
 LATEX_SPECIAL = {
     "\\": r"\textbackslash{}", "&": r"\&", "%": r"\%", "$": r"\$", "#": r"\#", "_": r"\_", "{": r"\{", "}": r"\}",
@@ -51,13 +49,6 @@ def to_latex(table: Table) -> str:
     )
 
 
-def to_html(table: Table) -> str:
-    """A heading, the table and its notes; texts are escaped."""
-    head = "".join(f"<th>{escape(heading)}</th>" for heading in table.headings)
-    body = "".join(f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in cells)}</tr>" for cells in table.rows)
-    return f"<h2>{escape(table.title)}</h2><table><tr>{head}</tr>{body}</table>{_html_notes(table.notes)}"
-
-
 def latex_text(text: str) -> str:
     """A text with LaTeX's own characters escaped."""
     return re.sub("|".join(map(re.escape, LATEX_SPECIAL)), lambda found: LATEX_SPECIAL[found.group()], text)
@@ -65,7 +56,3 @@ def latex_text(text: str) -> str:
 
 def _markdown_cell(text: str) -> str:
     return text.replace("|", "\\|").replace("\n", " ")
-
-
-def _html_notes(notes: Sequence[str]) -> str:
-    return f"<ul class=quiet>{''.join(f'<li>{escape(note)}</li>' for note in notes)}</ul>" if notes else ""

@@ -1,17 +1,16 @@
 """A suite's results as files: CSV for tools, Markdown, LaTeX and one HTML page for people."""
 
-import base64
 import csv
 import io
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict
-from html import escape
 from pathlib import Path
-from string import Template
 from typing import Any
 
+from semslam.eval.report.frames import data_uri
 from semslam.eval.report.intervals import draw_intervals
-from semslam.eval.report.tables import to_html, to_latex, to_markdown
+from semslam.eval.report.page import SuiteReport, make_suite
+from semslam.eval.report.tables import to_latex, to_markdown
 from semslam.runs.files import write_json, writing
 from semslam.studies.sweep.tables import SuiteResult, suite_bars, suite_tables
 from semslam.studies.sweep.work import Outcome
@@ -86,39 +85,13 @@ def _csv(rows: Iterable[Mapping[str, Any]]) -> str:
 
 
 def _page(result: SuiteResult, suite_text: str) -> str:
-    groups, picture = suite_bars(result), ""
-    if groups:
-        data = base64.b64encode(draw_intervals(groups)).decode("ascii")
-        picture = f'<figure><img alt="ATE of each method" src="data:image/png;base64,{data}"></figure>'
-    failed = f", {len(result.failures)} failed" if result.failures else ""
-    return PAGE.substitute(
-        title=escape(result.name),
-        count=f"{len(result.outcomes)} runs{failed}",
-        picture=picture,
-        tables="".join(map(to_html, suite_tables(result))),
-        suite=escape(suite_text),
+    groups, failures = suite_bars(result), result.failures
+    return make_suite(
+        SuiteReport(
+            title=result.name,
+            count=f"{len(result.outcomes)} runs" + (f", {len(failures)} failed" if failures else ""),
+            picture=data_uri("png", draw_intervals(groups)) if groups else None,
+            tables=tuple(suite_tables(result)),
+            suite=suite_text,
+        )
     )
-
-
-PAGE = Template("""<!doctype html>
-<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
-<title>$title</title>
-<style>
-body { font: 15px/1.5 system-ui, "Segoe UI", "DejaVu Sans", sans-serif; color: #222; background: #f6f7f8; margin: 0; }
-main { max-width: 1180px; margin: 0 auto; padding: 28px 24px 60px; }
-h1 { font-size: 26px; margin: 0; } h2 { font-size: 18px; margin: 32px 0 10px; }
-table, figure, details { background: #fff; border: 1px solid #e2e4e7; border-radius: 8px; }
-table { border-spacing: 0; padding: 4px 12px; font-variant-numeric: tabular-nums; }
-th { color: #667; font-weight: 600; font-size: 13px; } th, td { padding: 5px 18px 5px 0; text-align: right; }
-th:first-child, td:first-child { text-align: left; } tr + tr td { border-top: 1px solid #eceef0; }
-figure { margin: 18px 0 0; padding: 10px; } img { max-width: 100%; } .quiet { color: #667; font-size: 13px; }
-details { padding: 10px 14px; margin-top: 32px; } summary { cursor: pointer; }
-pre { overflow-x: auto; font-size: 13px; }
-</style></head><body><main>
-<h1>$title</h1><p class=quiet>$count; ATE is the root mean square position error after SE(3) alignment; intervals are
-95 % bootstrap intervals of the mean; the change is against the same odometry without loops, run by run.</p>
-$picture
-$tables
-<details><summary>The suite</summary><pre>$suite</pre></details>
-</main></body></html>
-""")

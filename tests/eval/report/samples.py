@@ -14,9 +14,12 @@ from semslam.eval.report.content import (
 )
 from semslam.eval.report.drawing import RunDrawing
 from semslam.eval.report.frames import KeyframeImage, LabelColor, data_uri, embed_images
+from semslam.eval.report.intervals import Bar, draw_intervals
 from semslam.eval.report.overlay import NamedTrajectory
-from semslam.eval.report.page import ComparedRun, ComparisonReport
+from semslam.eval.report.page import ComparedRun, ComparisonReport, SuiteReport
+from semslam.eval.report.tables import Table
 from semslam.eval.report.verdict import Tone, Verdict
+from semslam.runs.comparison import HEADINGS
 from semslam.types import Trajectory
 from tests.eval.report.ledgers import ALL_KINDS
 
@@ -55,8 +58,29 @@ REPORT = RunReport(
 COMPARISON = ComparisonReport(
     title="kitchen: 2 runs compared",
     verdict=Verdict("semantic is best.", Tone.GOOD),
-    headings=("ATE, cm",),
-    runs=(ComparedRun("none", ("28.0",)), ComparedRun("semantic", ("4.0",), "semantic/report.html")),
+    headings=HEADINGS,
+    runs=(
+        ComparedRun("none", ("28.0", *["28.03"] * 4, "1", "0 / 0 / 0", "0 / 0 / 0", "30.0")),
+        ComparedRun(
+            "semantic", ("4.0", *["4.03"] * 4, "1", "1143 / 465 / 448", "448 / 0 / 0", "8.5"), "semantic/report.html"
+        ),
+    ),
     trajectories=(NamedTrajectory("none", circle(0.05)), NamedTrajectory("semantic", circle(0.01))),
     truth=circle(),
+)
+SUITE = SuiteReport(
+    title="fr1",
+    count="8 runs, 1 failed",
+    picture=data_uri(
+        "png", draw_intervals([("desk", [Bar("semantic", 3.0, 2.5, 3.5, 8.0), Bar("peer", 4.0, ours=False)])])
+    ),
+    tables=(
+        Table(
+            "desk",
+            ("method", *(f"a rather long heading, number {number}" for number in range(9))),
+            tuple((name, *["4.03 ± 0.12"] * 9) for name in ("semantic with everything", "none")),
+            ("a note",),
+        ),
+    ),
+    suite="seeds: [0]",
 )

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from semslam.eval.report.page import make_comparison, make_report
-from tests.eval.report.samples import COMPARISON, REPORT
+from semslam.eval.report.page import make_comparison, make_report, make_suite
+from tests.eval.report.samples import COMPARISON, REPORT, SUITE
 
 sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-PAGES = {"run": make_report(REPORT), "comparison": make_comparison(COMPARISON)}
+PAGES = {"run": make_report(REPORT), "comparison": make_comparison(COMPARISON), "suite": make_suite(SUITE)}
 PATIENCE_MS = 300_000
 """A busy machine may take its time."""
 SIZES = {"desktop": (1400, 900), "phone": (390, 844)}
@@ -41,7 +41,8 @@ class Visit:
         self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
         self.page.on("request", lambda request: self.requests.append(request.url))
         self.page.goto(file.as_uri())
-        self.page.wait_for_selector("#view .main-svg")
+        if self.page.locator("#view").count():
+            self.page.wait_for_selector("#view .main-svg")
 
     @property
     def fetched(self) -> list[str]:
@@ -82,6 +83,11 @@ def test_nothing_overflows_or_fails_or_is_fetched(visit: Visit) -> None:
     assert visit.overflow() == 0
     assert visit.complaints == []
     assert visit.fetched == []
+
+
+@pytest.mark.parametrize("visit", [("comparison", "desktop"), ("suite", "desktop")], indirect=True)
+def test_tables_of_comparisons_are_no_wider_than_a_desktop(visit: Visit) -> None:
+    assert visit.overflow(".scroll") == 0
 
 
 @ON_RUNS

@@ -8,9 +8,9 @@ import pytest
 
 from semslam.errors import TrajectoryError
 from semslam.eval.report.content import ErrorRow
-from semslam.eval.report.page import make_comparison, make_report
+from semslam.eval.report.page import make_comparison, make_report, make_suite
 from tests.eval.report.ledgers import ALL_KINDS
-from tests.eval.report.samples import COMPARISON, EMPTY, REPORT, RUN, circle
+from tests.eval.report.samples import COMPARISON, EMPTY, REPORT, RUN, SUITE, circle
 
 
 class Collector(HTMLParser):
@@ -44,7 +44,7 @@ def parsed(page: str) -> Collector:
     return parser
 
 
-@pytest.mark.parametrize("page", [make_report(REPORT), make_comparison(COMPARISON)])
+@pytest.mark.parametrize("page", [make_report(REPORT), make_comparison(COMPARISON), make_suite(SUITE)])
 def test_a_page_carries_everything_and_links_nowhere(page: str) -> None:
     tags = parsed(page)
     assert all(source.startswith("data:") or "://" not in source for source in tags.sources)

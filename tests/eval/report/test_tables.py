@@ -1,6 +1,7 @@
 """Tables of texts in three languages."""
 
-from semslam.eval.report.tables import Table, latex_text, to_html, to_latex, to_markdown
+from semslam.eval.report.page import SuiteReport, make_suite
+from semslam.eval.report.tables import Table, latex_text, to_latex, to_markdown
 
 TABLE = Table("fr1_desk & more", ("method", "ATE"), (("a|b", "4.2 ± 0.1"), ("<c>", "100 %")), ("From x_y.",))
 
@@ -20,5 +21,7 @@ def test_latex_escapes_what_is_special_to_it() -> None:
 
 
 def test_html_escapes_its_texts() -> None:
-    assert "<td>&lt;c&gt;</td>" in to_html(TABLE)
-    assert "<h2>fr1_desk &amp; more</h2>" in to_html(TABLE)
+    page = make_suite(SuiteReport("a <suite>", "2 runs", None, (TABLE,), "seeds: [0]"))
+    assert "<th>&lt;c&gt;</th>" in page
+    assert "<h2>fr1_desk &amp; more</h2>" in page
+    assert "<suite>" not in page
