@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     from rerun import RecordingStream
 
 JPEG_QUALITY = 75
+IMAGE_INTERVAL = 0.09
+"""Seconds between two colour images that are shown: ten a second; compressing them is most of a viewer's work."""
 MILLIMETRES = 1000.0
 FRUSTUM = 0.25
 """Metres from the camera's centre at which its image is drawn."""
@@ -51,6 +53,7 @@ class RerunViewer:
     def __init__(self, stream: "RecordingStream") -> None:
         self._stream = stream
         self._last: FrameState | None = None
+        self._next_image = -np.inf
         self._poses: list[Transform] = []
         self._landmarks: set[int] = set()
         self._unlabelled: dict[int, Frame] = {}
@@ -73,7 +76,8 @@ class RerunViewer:
                 step = np.stack([before[:3, 3], now[:3, 3]])
                 self._stream.log(f"{LIVE}/{name}", rr.LineStrips3D([step], colors=_rgb(color)))
         self._stream.log(f"{TRACKING}/inliers", rr.Scalars(state.motion.inliers))
-        if frame is not None:
+        if frame is not None and (state.keyframe is not None or state.timestamp >= self._next_image):
+            self._next_image = state.timestamp + IMAGE_INTERVAL
             self._show_camera(frame.intrinsics)
             self._stream.log(f"{IMAGE}/color", rr.Image(frame.color).compress(jpeg_quality=JPEG_QUALITY))
 
