@@ -6,7 +6,7 @@
     python benchmarks/sensor.py --freiburg1 FOLDER
 
 Rendered scenes state nothing of their timing here. ``--track`` adds the live ATE of ``feature_map`` over the same
-frames with the true read-out, with the one that a run would estimate, and with none. ``--sequence`` estimates the
+frames with the true times, with those that a run would estimate, and with none. ``--sequence`` estimates the
 sensor of recordings. ``--freiburg1`` runs the nine sequences of TUM's fr1 that lie in a folder, whole and with default
 settings, and prints their final ATE.
 """
@@ -14,18 +14,20 @@ settings, and prints their final ATE.
 import argparse
 import sys
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from itertools import islice, product
 from pathlib import Path
 
 import numpy as np
 
 from semslam.config import Config
-from semslam.datasets import Dataset, open_dataset
+from semslam.datasets import open_dataset
 from semslam.datasets.camera_file import CameraSetup
 from semslam.eval.trajectory import score_trajectory
 from semslam.frontend.feature_map.odometry import FeatureMapOdometry
 from semslam.frontend.sensor.calibration import calibrate
-from semslam.frontend.sensor.estimate import Estimate, SensorEstimate
+from semslam.frontend.sensor.estimate import Estimate
+from semslam.geometry.camera import Intrinsics
 from semslam.geometry.se3 import compose
 from semslam.runs.pipeline import run
 from semslam.types import Frame, Trajectory
@@ -38,20 +40,16 @@ def cell(found: Estimate) -> str:
     return f"{1000 * found.value:.1f} ± {1000 * found.sigma:.1f}" if found.is_determined else "-"
 
 
-def live_ate(frames: Iterable[Frame], truth: Trajectory, readout: float) -> float:
+def live_ate(frames: Iterable[Frame], truth: Trajectory, camera: Intrinsics) -> str:
     """ATE of the causal poses in centimetres."""
-    odometry = FeatureMapOdometry.from_config(Config().with_changes(feature_map={"readout": readout}))
+    odometry = FeatureMapOdometry.from_config(Config())
     stamps, motions = [], []
     for frame in frames:
         stamps.append(frame.timestamp)
-        motions.append(odometry.track(frame).T_prev_cur)
+        motions.append(odometry.track(replace(frame, intrinsics=camera)).T_prev_cur)
     poses = compose(motions[1:], np.eye(4))
-    return 100 * float(score_trajectory(Trajectory(np.array(stamps), poses), truth).ate_rmse_m or np.nan)
-
-
-def used_readout(dataset: Dataset, estimate: SensorEstimate) -> float:
-    """What a run would track with."""
-    return estimate.applied(CameraSetup(dataset.intrinsics)).intrinsics.readout or 0.0
+    error = score_trajectory(Trajectory(np.array(stamps), poses), truth).ate_rmse_m
+    return "-" if error is None else f"{100 * error:.2f}"
 
 
 def rendered(arguments: argparse.Namespace) -> None:
@@ -67,8 +65,10 @@ def rendered(arguments: argparse.Namespace) -> None:
         found = [cell(estimate.readout), cell(estimate.delay), cell(estimate.depth_readout)]
         errors = []
         if arguments.track and dataset.ground_truth is not None:
-            used = (readout, used_readout(dataset, estimate), 0.0)
-            errors = [f"{live_ate(frames, dataset.ground_truth, value):.2f}" for value in used]
+            unknown = dataset.intrinsics
+            true = replace(unknown, readout=readout, delay=delay, depth_readout=arguments.depth_readout)
+            estimated = estimate.applied(CameraSetup(unknown)).intrinsics
+            errors = [live_ate(frames, dataset.ground_truth, camera) for camera in (true, estimated, unknown)]
         print_row([arguments.scene, str(seed), f"{1000 * readout:.0f}", f"{1000 * delay:.0f}", *found, *errors])
 
 
