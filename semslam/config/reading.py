@@ -29,7 +29,11 @@ MAX_FILE_BYTES = 4_000_000
 
 
 def load_config(path: Path | None = None, overrides: Mapping[str, Any] | None = None) -> Config:
-    """Read a YAML file (or the defaults) and lay nested ``overrides`` over it.
+    """The settings: defaults, then a YAML file, then overrides.
+
+    Args:
+        path: a YAML file, as ``semslam config`` prints it; None = the defaults alone.
+        overrides: nested values by section, such as ``{"detector": "dbow", "loops": {"min_gap": 3.0}}``.
 
     Raises:
         ConfigError: the file cannot be read, or a key, a value or a name is not known.

@@ -40,9 +40,9 @@ def run(
         dataset: the sequence.
         config: settings; the defaults if None.
         progress: called after each frame with its index and its state (None if it was unreadable).
-        viewer: is shown the run as it goes; None = nobody.
-        stop: says between frames whether the sequence is to end early, as Ctrl-C does.
-        journal: takes what is found as it is found.
+        viewer: shows the run while it is computed; None = no viewer.
+        stop: asked between frames whether to end the sequence early, as Ctrl-C does.
+        journal: records motions and verified candidates as they are found, to resume the run.
         verifier: decides on candidates; None = the registered one.
         feed: hands out the dataset's frames at their own time; None = each is read when the one before is done. With a
             feed nothing waits for loop closing, and the result depends on the machine's speed.
@@ -77,10 +77,10 @@ def replay(
         recording: what the front end made of it; of an interrupted run, the frames until then.
         config: settings; those of the front end must be the recorded run's (``SavedFrontEnd.check_settings``).
         progress: called after each frame with its index and its state.
-        verifier: decides on candidates; none = the built-in one.
-        viewer: is shown the run as it goes; None = nobody.
-        stop: says between frames whether the sequence is to end early.
-        journal: takes what is found as it is found.
+        verifier: decides on candidates; None = the registered one.
+        viewer: shows the run while it is computed; None = no viewer.
+        stop: asked between frames whether to end the sequence early.
+        journal: records motions and verified candidates as they are found, to resume the run.
 
     Raises:
         ConfigError: a name or setting is unknown.

@@ -19,13 +19,13 @@ class RunResult:
         config: the effective settings.
         slam: frames, keyframes, loops and graph.
         odometry: the front end's causal trajectory: tracked frames of its largest map.
-        live: the same frames as they stood when each was done, with the loops known by then.
+        live: the same frames with their poses at the time, by odometry and the loops known by then.
         trajectory: the final trajectory: tracked frames of the largest map.
         ground_truth: the dataset's, or None.
         ledger: one entry per loop candidate.
-        metrics: all figures.
+        metrics: all metrics, as in ``metrics.json``.
         profile: where the time went.
-        recording: what the front end made of the sequence, for a replay.
+        recording: the front end's motions and keyframes, for a replay.
         notes: what was corrected or left out, a sentence each.
     """
 

@@ -62,7 +62,7 @@ class Slam:
         graph: joins motions and loops for the final solution.
         config: settings of the back end.
         stopwatch: collects stage times.
-        listener: is handed each keyframe's answer when it is taken in, such as for a viewer.
+        listener: called with each keyframe's loop-closing answer when it takes effect, such as for a viewer.
         realtime: whether tracking goes on without waiting for loop closing.
     """
 
@@ -111,7 +111,7 @@ class Slam:
             stopwatch: collects stage times.
             verifier: decides on candidates; None = the registered one.
             worker: where loops are closed; in a thread or process of its own tracking does not wait for them.
-            listener: is handed each keyframe's answer when it is taken in.
+            listener: called with each keyframe's loop-closing answer when it takes effect.
             realtime: whether tracking goes on without waiting for loop closing.
 
         Raises:
