@@ -27,7 +27,7 @@ REASONS = {
     "inconsistent": "contradicts odometry",
     "ambiguous": "ambiguous",
     "outlier": "outlier in the graph",
-    "shed": "not verified for want of time",
+    "shed": "not verified: loop closing was behind",
 }
 
 

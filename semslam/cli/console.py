@@ -113,7 +113,7 @@ def _realtime_rows(runs: Sequence["Metrics"]) -> list[tuple[str, list[str]]]:
     values = [run.realtime for run in runs]
     return [
         ("frames dropped", ["-" if value is None else str(value.dropped) for value in values]),
-        ("candidates not verified for want of time", ["-" if value is None else str(value.shed) for value in values]),
+        ("candidates left unverified", ["-" if value is None else str(value.shed) for value in values]),
         ("tracking of a frame, ms, median / p99", [_quantiles(run.time.tracking_ms, 1) for run in runs]),
         ("keyframe to its loop's effect, s, median / p99", [_quantiles(run.time.loop_s, 2) for run in runs]),
     ]

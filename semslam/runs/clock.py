@@ -35,5 +35,5 @@ class RunClock:
         )
 
     def profile(self, wall_s: float, stopwatch: Stopwatch, latencies: Latencies) -> Profile:
-        """Where the time of a run of so many seconds went."""
+        """The timed calls of the run, given its length in seconds."""
         return Profile(self._start.process, self._wall, wall_s, stopwatch.spans, latencies.tracking, latencies.loops)

@@ -19,7 +19,7 @@ def write_inliers(directory: Path, outcomes: Sequence[Verification], keyframes: 
 
     Args:
         directory: the run folder.
-        outcomes: what the verification made of each candidate, in the ledger's order.
+        outcomes: each candidate's outcome, in the ledger's order.
         keyframes: ``keyframes[i].id`` is i.
     """
     found = {index: _pixels(loop, keyframes) for index, loop in enumerate(outcomes) if isinstance(loop, LoopConstraint)}

@@ -1,7 +1,7 @@
 """A run's journal: motions and verified candidates, appended as they are found, to resume a run that was killed.
 
 The file is a row of records, each with its length and a CRC-32. A record that a crash has cut short, and whatever
-follows a damaged one, is left out when the journal is read, and cut off when it is gone on with.
+follows a damaged one, is left out when the journal is read, and cut off when the run is resumed.
 """
 
 import errno
@@ -70,7 +70,7 @@ class JournalHeader:
         saved_run: Path | None,
         command: Sequence[str],
     ) -> Self:
-        """The header of a run; places are written in full, for it may be gone on with from another folder."""
+        """The header of a run; paths are absolute, since it may be resumed from another folder."""
         whole = str(Path(source).resolve()) if Path(source).exists() else source
         saved = None if saved_run is None else str(saved_run.resolve())
         return cls(config.dump(), whole, plots, saved, tuple(command))
@@ -83,7 +83,7 @@ class JournalContent:
     Attributes:
         header: what the run was asked to do.
         frames: the record of each frame that was done.
-        outcomes: what the verification made of candidates, by query and match, in order.
+        outcomes: outcomes of candidates by query and match, in order.
         length: bytes until the last whole record.
     """
 
@@ -131,7 +131,7 @@ class Journal:
             self._append(record)
         elif self._past.popleft() != record:
             raise JournalError(
-                f"Frame {state.index} does not come out again as the journal has it: the images, the machine or a "
+                f"Frame {state.index} differs from the journal: the images, the machine or a "
                 "library are not what they were. Run the sequence anew."
             )
 

@@ -33,13 +33,13 @@ def run_journaled(
     Args:
         dataset: the sequence.
         config: settings.
-        header: what the run was asked to do, for who goes on with it.
+        header: what the run was asked to do, for resuming it.
         place: where the run is to be.
         progress: called after each frame.
         stop: says between frames whether the run is to end early.
-        past: the journal of a run that is gone on with.
+        past: the journal of a run that is resumed.
         recording: motions that are repeated instead of tracked.
-        viewer: is shown the run as it goes.
+        viewer: shows the run while it is computed.
 
     Raises:
         SemslamError: as ``run`` and ``replay`` do.

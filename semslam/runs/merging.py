@@ -34,8 +34,8 @@ class Merge:
     """Two sessions as one sequence.
 
     Attributes:
-        dataset: their frames in a row.
-        recording: what their front ends made of them; the second one's maps and landmarks have numbers of their own.
+        dataset: their frames, one run after the other.
+        recording: motions and keyframes of both; the second one's maps and landmarks have numbers of their own.
         config: the first run's settings.
     """
 
@@ -52,7 +52,7 @@ class Merge:
 def prepare_merge(
     first: SavedFrontEnd, second: SavedFrontEnd, config: Config | None = None, one_truth: bool = False
 ) -> Merge:
-    """Put two saved runs in a row.
+    """Concatenate two saved runs.
 
     Args:
         first: a run's front end.

@@ -74,7 +74,7 @@ def replay(
 
     Args:
         dataset: the sequence that was recorded.
-        recording: what the front end made of it; of an interrupted run, the frames until then.
+        recording: its saved front end; of an interrupted run, the frames until then.
         config: settings; those of the front end must be the recorded run's (``SavedFrontEnd.check_settings``).
         progress: called after each frame with its index and its state.
         verifier: decides on candidates; None = the registered one.

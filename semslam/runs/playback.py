@@ -25,7 +25,7 @@ def play(saved: SavedViews, viewer: Viewer, progress: Progress = silent) -> None
 
     Args:
         saved: the run and its images.
-        viewer: is shown them.
+        viewer: shows them.
         progress: called with the frames done and in all.
 
     Raises:

@@ -36,11 +36,11 @@ class RecordedFrame:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Recording:
-    """What the front end made of a sequence.
+    """The front end's result on a sequence: motions and keyframes.
 
     Attributes:
         frames: every frame the odometry was shown; landmarks are kept of keyframes alone.
-        unreadable: what was said of each frame that could not be read.
+        unreadable: the message of each frame that could not be read.
         interrupted: whether the run was stopped before the last frame.
         checksum: of the first frame's images, by which the sequence is known again.
     """
@@ -71,7 +71,7 @@ class SavedFrontEnd:
 
     Attributes:
         config: the settings it ran with.
-        recording: what its front end made of the sequence.
+        recording: its front end's motions and keyframes.
         source: what the sequence was opened by, or None.
     """
 
@@ -121,7 +121,7 @@ def write_recording(directory: Path, recording: Recording, source: str | None = 
 
     Args:
         directory: the run folder.
-        recording: what the front end made of the sequence.
+        recording: the front end's motions and keyframes.
         source: what the sequence was opened by; the name of a file in the folder stays as it is.
     """
     if source is not None:

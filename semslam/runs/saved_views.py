@@ -35,7 +35,7 @@ class SavedViews:
 
     Attributes:
         run: the run folder's content.
-        recording: what its front end made of the sequence.
+        recording: its front end's motions and keyframes.
         dataset: the sequence it ran on.
         keyframes: in order.
     """

@@ -61,7 +61,7 @@ def compare_detectors(
         DatasetError: the sequence has no ground truth.
     """
     if dataset.ground_truth is None:
-        raise DatasetError(f"{dataset.name} has no ground truth, which loop truth is made of.")
+        raise DatasetError(f"{dataset.name} has no ground truth, which loop truth is computed from.")
     contestants = {name: _contestant(name, config, 1 + len(dataset) // every) for name in names}
     needs_labels = any(plugins.load("semslam.detectors", name).needs_labels for name in names)
     depths: list[DepthView] = []

@@ -95,7 +95,7 @@ def try_pairs(
 
     def scored(name: str, pairs: Sequence[Pair]) -> ScoredPairs:
         if not pairs:
-            raise DatasetError(f"{name} gives no pairs: no two of its frames surely show different places.")
+            raise DatasetError(f"{name} gives no pairs: no two of its frames certainly show different places.")
         return ScoredPairs(name, pairs, _scores(name, pairs, config, names, report))
 
     def of_sequence(path: str) -> ScoredPairs:

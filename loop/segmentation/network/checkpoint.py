@@ -39,7 +39,7 @@ def load_network(path: Path) -> DeepLab:
         network = build_mobilenet_deeplab(decoder_channels=state["classifier.weight"].shape[1])
         network.load_state_dict(state)
     except (KeyError, IndexError, RuntimeError) as error:
-        raise ModelError(f"The weights {path} belong to another network than the one asked for.") from error
+        raise ModelError(f"The weights {path} belong to another network.") from error
     return network
 
 
