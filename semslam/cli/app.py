@@ -23,6 +23,7 @@ from semslam.cli import (
     scores,
     sensors,
     sweeps,
+    vslamlab,
 )
 from semslam.cli.console import complain, remark, shown
 from semslam.errors import SemslamError, SemslamWarning
@@ -55,7 +56,8 @@ def root(
 
 
 MODULES = (
-    runs, live, sweeps, checks, pictures, scores, exports, maps, merging, graphs, models, sensors, environment
+    runs, live, sweeps, checks, pictures, scores, exports, maps, merging, graphs, models, sensors, vslamlab,
+    environment
 )  # fmt: skip
 for module in MODULES:
     for command in module.COMMANDS:
