@@ -127,7 +127,7 @@ def profile_table(profile: "Profile") -> Table:
     """A row for each stage and thread."""
     from semslam.runs.profile import stage_rows
 
-    table = _narrow(f"Where {profile.wall_s:.1f} s went")
+    table = narrow_table(f"Where {profile.wall_s:.1f} s went")
     for heading in ("where", "stage", "calls", "total, s", "of the run", "median, ms", "p95, ms", "worst, ms"):
         table.add_column(heading, justify="left" if heading in ("where", "stage") else "right")
     for row in stage_rows(profile):
@@ -138,7 +138,7 @@ def profile_table(profile: "Profile") -> Table:
 
 def comparison_table(runs: Sequence["Metrics"], title: str) -> Table:
     """A row per detector, narrow enough for 80 columns; centimetres."""
-    table = _narrow(title)
+    table = narrow_table(title)
     headings = ("detector", "alone", "ATE", "max", "RPE", "deg", "tracked", "loops", "t/i/f")
     for heading in headings:
         table.add_column(heading, justify="left" if heading == "detector" else "right", no_wrap=True)
@@ -164,7 +164,7 @@ def comparison_table(runs: Sequence["Metrics"], title: str) -> Table:
 
 def text_table(content: "TextTable") -> Table:
     """A table of texts on the terminal."""
-    table = _narrow(content.title)
+    table = narrow_table(content.title)
     for heading in content.headings:
         table.add_column(heading, justify="left" if heading == content.headings[0] else "right")
     for cells in content.rows:
@@ -173,8 +173,9 @@ def text_table(content: "TextTable") -> Table:
     return table
 
 
-def _narrow(title: str) -> Table:
-    return Table(title=title, title_justify="left", caption_justify="left", box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
+def narrow_table(title: str | None = None) -> Table:
+    """An empty table whose columns are one blank apart, for tables that just fit into 80 columns."""
+    return Table(title=title, title_justify="left", caption_justify="left", box=SIMPLE_HEAD, padding=0, show_edge=False)
 
 
 def _counts(loops: "LoopMetrics", *names: str) -> str:

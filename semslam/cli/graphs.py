@@ -6,18 +6,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
+from semslam import plugins
 from semslam.cli import options
 from semslam.cli.command import Command, example
 from semslam.cli.console import out, remark, remarks
+from semslam.cli.ledger import ledger_table
+from semslam.cli.progress import busy
 from semslam.errors import ConfigError
 
 if TYPE_CHECKING:
     from semslam.backend.analysis.certificate import Certificate
     from semslam.backend.graph.products import GraphSolution
-    from semslam.types import LedgerEntry, LoopContribution
 
 RunFolder = Annotated[Path, typer.Argument(help="A run folder.")]
 
@@ -46,7 +47,7 @@ def ledger_command(
         for entry in chosen:
             typer.echo(entry.to_json())
         return
-    out.print(_ledger_table(chosen))
+    out.print(ledger_table(chosen))
     counts = Counter(str(entry.reason or entry.verdict) for entry in chosen)
     out.print(f"{len(chosen)} candidates: " + ", ".join(f"{n} {what}" for what, n in counts.most_common()))
 
@@ -66,8 +67,10 @@ def graph_command(
 
     graph = read_g2o(file)
     remarks(graph.notes)
-    solution = judge_graph(graph, options.settings(config, overrides).backend)
-    certificate = certify(solution)
+    backend = options.settings(config, overrides).backend
+    with busy(f"{file.name} graph"):
+        solution = judge_graph(graph, backend)
+        certificate = certify(solution)
     if out_file is not None:
         write_g2o(out_file, solution)
     if as_json:
@@ -125,7 +128,13 @@ def stress_command(
         float, typer.Option(min=0.0, max=0.95, callback=options.finite, help="Share of false ones among all loops.")
     ] = 0.3,
     kind: Annotated[str, typer.Option(help="random, or consistent among themselves.")] = "random",
-    backends: Annotated[str | None, typer.Option(help="Names joined by commas; default: all.")] = None,
+    backends: Annotated[
+        str | None,
+        typer.Option(
+            help=f"Names joined by commas: {', '.join(plugins.ROBUST)}; default: all.",
+            autocompletion=options.completion("semslam.robust"),
+        ),
+    ] = None,
     seed: options.Seed = None,
     as_json: options.Json = False,
 ) -> None:
@@ -136,7 +145,8 @@ def stress_command(
     if kind not in set(FalseLoopKind):
         raise ConfigError(f"There is no kind '{kind}' of false loops. Known: {', '.join(FalseLoopKind)}.")
     names = None if backends is None else [name.strip() for name in backends.split(",")]
-    rows = stress_run(run, [Attack(false_loops, FalseLoopKind(kind), seed or 0)], names)
+    with busy(f"{run.name} stress"):
+        rows = stress_run(run, [Attack(false_loops, FalseLoopKind(kind), seed or 0)], names)
     if as_json:
         typer.echo(json.dumps({"backends": [row.model_dump() for row in rows]}))
         return
@@ -149,39 +159,6 @@ def stress_command(
     out.print(table)
     if rows and rows[0].ate_m is None:
         remark("The run has no ground truth file beside it; ATE is not known.")
-
-
-def _ledger_table(entries: "list[LedgerEntry]") -> Table:
-    table = Table(box=SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False)
-    headings = ("query", "match", "seconds", "score", "verdict", "reason", "inliers", "fitness", "weight", "truth")
-    for heading in (*headings, "gain, cm"):
-        table.add_column(heading, justify="left" if heading in ("verdict", "reason", "truth") else "right")
-    for e in entries:
-        reason = "" if e.reason is None else e.reason
-        if e.figure is not None:
-            reason += f" {e.figure:.3g} (limit {e.limit:.3g})"
-        error = "" if e.truth is None else f"{e.truth.judgement} {100 * e.truth.translation_m:.0f} cm"
-        table.add_row(
-            str(e.query),
-            str(e.match),
-            f"{e.query_time - e.match_time:.1f}",
-            f"{e.score:.3f}",
-            e.verdict.value,
-            reason,
-            "" if e.inliers is None else str(e.inliers),
-            "" if e.fitness is None else f"{e.fitness:.2f}",
-            "" if e.weight is None else f"{e.weight:.2f}",
-            error,
-            "" if e.contribution is None else _gain(e.contribution),
-        )
-    return table
-
-
-def _gain(contribution: "LoopContribution") -> str:
-    """By how much the ATE grows without a loop; without ground truth, how far the keyframes move."""
-    if contribution.ate_gain_m is None:
-        return f"moves {100 * contribution.shift_m:.2f}"
-    return f"{100 * contribution.ate_gain_m:+.2f}"
 
 
 COMMANDS = (

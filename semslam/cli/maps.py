@@ -1,5 +1,6 @@
 """semslam map, diff, view."""
 
+import json
 from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -8,6 +9,7 @@ import typer
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
+from semslam.cli import options
 from semslam.cli.command import Command, example
 from semslam.cli.console import out
 from semslam.cli.progress import bar
@@ -56,10 +58,11 @@ def diff_command(
     at: Annotated[float | None, typer.Option("--at", help="Compare one run before and after this stamp, s.")] = None,
     voxel: Voxel = None,
     out_file: Annotated[Path | None, typer.Option("--out", help="Write the changes as JSON.")] = None,
+    as_json: options.Json = False,
 ) -> None:
     """Find objects that moved, disappeared or appeared between two runs, or two parts of one."""
     from semslam.runs.alignment import align_runs
-    from semslam.runs.differences import find_changes, write_changes
+    from semslam.runs.differences import change_values, find_changes, write_changes
     from semslam.runs.files import check_place
     from semslam.runs.saved_views import open_saved
 
@@ -78,6 +81,9 @@ def diff_command(
         changes = find_changes(first, second, T_first_second, voxel, update)
     if out_file is not None:
         write_changes(out_file, changes)
+    if as_json:
+        typer.echo(json.dumps(change_values(changes)))
+        return
     out.print(_changes_table(changes))
 
 

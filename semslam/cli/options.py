@@ -15,7 +15,9 @@ if TYPE_CHECKING:
 
 MOST = 2**31 - 1
 RUNS = Path("runs")
-SEQUENCE_HELP = "A sequence: a folder (TUM, 7-Scenes, generic), a .bag or synthetic:..."
+SEQUENCE_HELP = (
+    "A sequence: a folder (TUM, 7-Scenes, Replica, ... see docs/datasets.md), a .bag or .mcap, or synthetic:..."
+)
 Sequence = Annotated[str, typer.Argument(help=SEQUENCE_HELP)]
 
 
@@ -29,7 +31,8 @@ def completer(known: Callable[[], list[str]]) -> Callable[[str], list[str]]:
     return complete
 
 
-def _completion(group: plugins.Group) -> Callable[[str], list[str]]:
+def completion(group: plugins.Group) -> Callable[[str], list[str]]:
+    """Complete the names of a group, plug-ins' included."""
     return completer(lambda: plugins.names(group))
 
 
@@ -38,7 +41,7 @@ Odometry = Annotated[
     typer.Option(
         "--odometry",
         help=f"Odometry: {', '.join(plugins.ODOMETRIES)}, or a plug-in's.",
-        autocompletion=_completion("semslam.odometry"),
+        autocompletion=completion("semslam.odometry"),
     ),
 ]
 Detector = Annotated[
@@ -46,23 +49,23 @@ Detector = Annotated[
     typer.Option(
         "--detector",
         help=f"Loop detector: {', '.join(plugins.DETECTORS)}, or a plug-in's; 'none' for no loops.",
-        autocompletion=_completion("semslam.detectors"),
+        autocompletion=completion("semslam.detectors"),
     ),
 ]
 Detectors = Annotated[
     str,
     typer.Option(
         "--detectors",
-        help="Loop detectors joined by commas (see 'semslam run --help').",
-        autocompletion=_completion("semslam.detectors"),
+        help=f"Loop detectors joined by commas: {', '.join(plugins.DETECTORS)}, or plug-ins'.",
+        autocompletion=completion("semslam.detectors"),
     ),
 ]
 Loader = Annotated[
     str | None,
     typer.Option(
         "--loader",
-        help="Dataset loader; guessed from the path by default.",
-        autocompletion=_completion("semslam.datasets"),
+        help=f"Dataset loader: {', '.join(plugins.DATASETS)}; guessed from the path by default.",
+        autocompletion=completion("semslam.datasets"),
     ),
 ]
 ConfigFile = Annotated[Path | None, typer.Option("--config", help="YAML settings (see 'semslam config').")]

@@ -7,6 +7,7 @@ import typer
 
 from semslam.cli.command import Command, example
 from semslam.cli.console import out, remark
+from semslam.cli.progress import busy
 from semslam.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -32,7 +33,7 @@ def report_command(
     from semslam.runs.saved_views import find_images
 
     check_place(run)
-    with writing(run):
+    with writing(run), busy(f"{run.name} report"):
         if is_comparison(run):
             present_comparison(run)
         else:
@@ -62,7 +63,7 @@ def plot_command(
     wanted = _settings(formats, size, font, font_size, title)
     saved = [read_run(run) for run in runs]
     check_place(out_directory)
-    with writing(out_directory):
+    with writing(out_directory), busy("pictures"):
         for settings in wanted:
             if len(saved) == 1:
                 written = write_plots(saved[0], out_directory, settings)

@@ -1,5 +1,6 @@
 """How far long work has got: a bar on a terminal, a line every ten seconds into a file or a pipe."""
 
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -41,3 +42,25 @@ def progress_lines(title: str, total: int | None, unit: str, clock: Callable[[],
         remark(f"{title}: {count} after {now - began:.0f} s")
 
     return update
+
+
+@contextmanager
+def busy(title: str) -> Iterator[None]:
+    """State that work goes on of which nobody knows how much there is: a spinner, or a line every ten seconds."""
+    if err.is_terminal:
+        with err.status(shown(title)):
+            yield
+        return
+    began, done = time.monotonic(), threading.Event()
+
+    def report() -> None:
+        while not done.wait(SECONDS_BETWEEN_LINES):
+            remark(f"{title}: {time.monotonic() - began:.0f} s")
+
+    thread = threading.Thread(target=report, daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        done.set()
+        thread.join()

@@ -100,8 +100,11 @@ def _computed(task: Task, place: "RunPlace", stop: "Stop", past: "JournalContent
         return run_journaled(dataset, config, header, place, progress, stop, past, recording, task.viewer)
 
 
-def show(done: Done, task: Task) -> None:
-    """Print what a run found and where it is."""
+def show(done: Done, task: Task, as_json: bool = False) -> None:
+    """Print what a run found and where it is, or its metrics for tools."""
+    if as_json:
+        typer.echo(done.metrics.model_dump_json())
+        return
     out.print(metrics_table([done.metrics], f"{task.dataset.name}: {done.metrics.frames} frames"))
     if task.profile:
         out.print(profile_table(done.profile))

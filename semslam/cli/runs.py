@@ -57,6 +57,7 @@ def run_command(
     resume: Annotated[
         Path | None, typer.Option("--resume", help="A run folder whose run was killed: goes on with it.")
     ] = None,
+    as_json: options.Json = False,
 ) -> None:
     """Run SLAM over a sequence and write a run folder."""
     from semslam.config import parse_faults
@@ -87,7 +88,7 @@ def run_command(
             )
         ):
             raise ConfigError("--resume takes all settings from the run's journal; only the sequence may be named.")
-        _resume(resume, sequence)
+        _resume(resume, sequence, as_json)
         return
     if rate is not None and not realtime:
         raise ConfigError("--rate is for --realtime.")
@@ -120,11 +121,11 @@ def run_command(
             viewer.close()
         if out_directory is None:
             link_latest(options.RUNS, done.directory)
-        show(done, task)
+        show(done, task, as_json)
         end(done, task, stop)
 
 
-def _resume(directory: Path, sequence: str | None) -> None:
+def _resume(directory: Path, sequence: str | None, as_json: bool) -> None:
     """Go on with a run that was killed, as its journal has it."""
     from semslam.config import load_saved_config
     from semslam.datasets import open_dataset
@@ -149,7 +150,7 @@ def _resume(directory: Path, sequence: str | None) -> None:
             done = carry_out(task, place, stop, past)
         if done.directory.resolve().parent == options.RUNS.resolve():
             link_latest(options.RUNS, done.directory)
-        show(done, task)
+        show(done, task, as_json)
         end(done, task, stop)
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
+from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from semslam.cli import options
@@ -69,6 +70,7 @@ def loops_command(
     start: options.Start = 0,
     max_frames: options.MaxFrames = None,
     loader: options.Loader = None,
+    as_json: options.Json = False,
 ) -> None:
     """Score loop detectors on a sequence by precision and recall."""
     from semslam.datasets import open_dataset
@@ -85,7 +87,8 @@ def loops_command(
         comparison = compare_detectors(dataset, chosen, names, every, update)
     with writing(out_directory):
         out_directory.mkdir(parents=True, exist_ok=True)
-    write_json(out_directory / "loops.json", {"detectors": [asdict(quality) for quality in comparison.qualities]})
+    values = {"detectors": [asdict(quality) for quality in comparison.qualities]}
+    write_json(out_directory / "loops.json", values)
     with writing(out_directory / "precision_recall.png"):
         title = f"{dataset.name}, {every_nth(every)} frame"
         (out_directory / "precision_recall.png").write_bytes(draw_curves(comparison.curves, title))
@@ -94,13 +97,16 @@ def loops_command(
             title = f"{dataset.name}: probability by {PROBABILISTIC}"
             bins = comparison.reliabilities[PROBABILISTIC]
             (out_directory / "reliability.png").write_bytes(draw_reliability(bins, title))
-    table = Table(title=f"{dataset.name}, {every_nth(every)} frame a keyframe", title_justify="left")
-    table.add_column("detector")
-    for heading in ("AP", "recall at 100 %", "recall at 99 %", "max F1", "recall@1", "ms"):
+    if as_json:
+        typer.echo(json.dumps(values))
+        return
+    table = Table(title=f"{dataset.name}, {every_nth(every)} frame a keyframe", title_justify="left", box=SIMPLE_HEAD)
+    table.add_column("detector", no_wrap=True)
+    for heading in ("AP", "recall at 100 %", "at 99 %", "max F1", "recall@1", "ms"):
         table.add_column(heading, justify="right")
     for q in comparison.qualities:
-        values = (q.average_precision, q.recall_at_100_precision, q.recall_at_99_precision, q.max_f1, q.recall_at_1)
-        table.add_row(q.detector, *("-" if f is None else f"{f:.3f}" for f in values), f"{q.ms_per_query:.1f}")
+        figures = (q.average_precision, q.recall_at_100_precision, q.recall_at_99_precision, q.max_f1, q.recall_at_1)
+        table.add_row(q.detector, *("-" if f is None else f"{f:.3f}" for f in figures), f"{q.ms_per_query:.1f}")
     out.print(table)
     out.print(f"{q.true_pairs} true and {q.false_pairs} false pairs; results: {out_directory}", soft_wrap=True)
 
@@ -113,9 +119,7 @@ def pairs_command(
     threshold_from: Annotated[
         list[str] | None, typer.Option("--threshold-from", help="Sequence that thresholds come from; may be repeated.")
     ] = None,
-    detectors: Annotated[
-        str, typer.Option("--detectors", help="Names joined by commas.")
-    ] = "semantic-paper,semantic,fused,sda,dbow,cnnw,conv3",
+    detectors: options.Detectors = "semantic-paper,semantic,fused,sda,dbow,cnnw,conv3",
     every: Annotated[
         int, typer.Option(min=1, max=options.MOST, help="Frames from one that may be chosen to the next.")
     ] = 5,
@@ -126,6 +130,7 @@ def pairs_command(
     config: options.ConfigFile = None,
     overrides: options.Settings = None,
     seed: options.Seed = None,
+    as_json: options.Json = False,
 ) -> None:
     """Separate the same place from hard negatives under changes of viewpoint, light and objects."""
     from semslam.runs.files import check_place, writing
@@ -144,10 +149,17 @@ def pairs_command(
     with writing(out_directory):
         out_directory.mkdir(parents=True, exist_ok=True)
     _write_pairs(trial, out_directory)
+    if as_json:
+        typer.echo(json.dumps(_pair_values(trial)))
+        return
     _print_pairs(trial)
     source = ", ".join(plan.tuning_sequences) or "the other sets given"
     own = f"; that of {PROBABILISTIC} is its own" if PROBABILISTIC in names else ""
     out.print(f"Thresholds from {source}{own}; results: {out_directory}", soft_wrap=True)
+
+
+def _pair_values(trial: "PairTrial") -> dict[str, object]:
+    return {"detectors": [asdict(quality) for quality in trial.qualities]}
 
 
 def _write_pairs(trial: "PairTrial", directory: Path) -> None:
@@ -156,7 +168,7 @@ def _write_pairs(trial: "PairTrial", directory: Path) -> None:
     from semslam.eval.pairs.table import accuracy_by_kind, kind_rows, pair_rows
     from semslam.runs.files import write_json, writing
 
-    write_json(directory / "pairs.json", {"detectors": [asdict(quality) for quality in trial.qualities]})
+    write_json(directory / "pairs.json", _pair_values(trial))
     with writing(directory):
         (directory / "pairs.csv").write_text(pair_rows(trial.tested, trial.thresholds), encoding="utf-8")
         kinds = accuracy_by_kind(trial.tested, trial.thresholds)

@@ -90,8 +90,19 @@ def demo_command(
     out.print(f"Open {out_directory / 'semantic' / 'report.html'} to see every loop.", soft_wrap=True)
 
 
+def _shipped() -> list[str]:
+    from semslam.studies.sweep.suite import shipped_suites
+
+    return shipped_suites()
+
+
 def bench_command(
-    suite: Annotated[str, typer.Argument(help="A suite in YAML, or the name of a shipped one.")],
+    suite: Annotated[
+        str,
+        typer.Argument(
+            help="A suite in YAML, or the name of a shipped one.", autocompletion=options.completer(_shipped)
+        ),
+    ],
     out_directory: Annotated[
         Path | None, typer.Option("--out", help="Folder of the suite (default: bench/NAME); what is there goes on.")
     ] = None,
@@ -102,7 +113,14 @@ def bench_command(
         list[str] | None,
         typer.Option("--external", help="NAME=EST.txt: another system's trajectory; '{sequence}' in the path."),
     ] = None,
-    detectors: Annotated[str | None, typer.Option("--detectors", help="Instead of the suite's.")] = None,
+    detectors: Annotated[
+        str | None,
+        typer.Option(
+            "--detectors",
+            help="Instead of the suite's, joined by commas.",
+            autocompletion=options.completion("semslam.detectors"),
+        ),
+    ] = None,
     max_frames: options.MaxFrames = None,
     config: options.ConfigFile = None,
     overrides: options.Settings = None,

@@ -46,13 +46,18 @@ def find_changes(
     return compare(*maps, before.read(progress), moved())
 
 
+def change_values(changes: tuple[Change, ...]) -> list[dict[str, object]]:
+    """Changes for tools; places are in the first run's world, metres."""
+    return [_plain(change) for change in changes]
+
+
 def write_changes(path: Path, changes: tuple[Change, ...]) -> None:
     """Write changes as JSON; places are in the first run's world.
 
     Raises:
         ResultsError: the file cannot be written.
     """
-    write_json(path, [_plain(change) for change in changes])
+    write_json(path, change_values(changes))
 
 
 def _plain(change: Change) -> dict[str, object]:

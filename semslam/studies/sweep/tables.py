@@ -21,7 +21,8 @@ HEADINGS = (
     "tracked",
     "with truth",
 )
-BRIEF = ("method", "runs", "ATE, cm", "95 % interval", "change by loops, cm", "tracked")
+BRIEF = ("method", "runs", "ATE, cm", "95 % interval", "change, cm", "t/i/f", "tracked")
+SHORT = {"change by loops, cm": "change, cm", "true / inaccurate / false": "t/i/f"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +61,7 @@ def suite_tables(result: SuiteResult, brief: bool = False) -> list[Table]:
     """
     tables = [_sequence_table(result, sequence) for sequence in result.sequences]
     if brief:
-        tables = [_with_columns(table, BRIEF) for table in tables]
+        tables = [_narrow(table) for table in tables]
     if result.failures:
         rows = tuple((str(outcome.case), outcome.failure) for outcome in result.failures)
         tables.append(Table(f"Failed: {len(rows)} of {len(result.outcomes)} runs", ("run", "why"), rows))
@@ -121,10 +122,15 @@ def _sequence_table(result: SuiteResult, sequence: str) -> Table:
     return Table(sequence, HEADINGS, tuple(cells), (*published, *unscored))
 
 
-def _with_columns(table: Table, headings: tuple[str, ...]) -> Table:
-    places = [table.headings.index(heading) for heading in headings]
-    rows = tuple(tuple(cells[place] for place in places) for cells in table.rows)
-    return replace(table, headings=headings, rows=rows)
+def _narrow(table: Table) -> Table:
+    """The columns that there is room for, each without what stands in the files: an interval of the change, blanks."""
+    names = [SHORT.get(heading, heading) for heading in table.headings]
+    places = [names.index(heading) for heading in BRIEF]
+    rows = tuple(
+        tuple(cells[place].split(" (")[0] if place else cells[place] for place in places) for cells in table.rows
+    )
+    rows = tuple(tuple(cell.replace(" / ", "/") for cell in cells) for cells in rows)
+    return replace(table, headings=BRIEF, rows=rows)
 
 
 def _cells(row: Row, rows: Sequence[Row]) -> tuple[str, ...]:

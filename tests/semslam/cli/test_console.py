@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
+from semslam.cli import progress
 from semslam.cli.app import _show_warning
 from semslam.cli.console import complain, every_nth, metrics_table, out, remark, text_table
 from semslam.cli.options import completer
-from semslam.cli.progress import progress_lines
 from semslam.config import Config
 from semslam.eval.report.tables import Table
 from semslam.runs.pipeline import run
@@ -26,7 +26,7 @@ def test_ordinals(number: int, words: str) -> None:
 
 def test_a_line_every_ten_seconds_and_none_before(capsys: pytest.CaptureFixture[str]) -> None:
     times: Iterator[float] = iter([0.0, 4.0, 11.0, 12.0, 22.0])
-    update = progress_lines("room", 40, "frames", lambda: next(times))
+    update = progress.progress_lines("room", 40, "frames", lambda: next(times))
     for done in (4, 11, 12, 22):
         update(done, None)
     assert capsys.readouterr().err.splitlines() == [
@@ -66,10 +66,19 @@ def test_no_control_character_of_a_file_reaches_the_terminal(
     complain(EVIL)
     remark(EVIL)
     _show_warning(EVIL, UserWarning, EVIL, 1)
-    progress_lines(EVIL, 2, "frames", iter([0.0, 20.0]).__next__)(1, None)
+    progress.progress_lines(EVIL, 2, "frames", iter([0.0, 20.0]).__next__)(1, None)
     printed = capsys.readouterr()
     write_run(result, wall, tmp_path / "run", plots=False)
     checked = semslam("check", tmp_path / "run", "--max-maps", 1)
     for text in (printed.out, printed.err, checked.out):
         assert "owned" in text
         assert all(character.isprintable() for character in text.replace("\n", ""))
+
+
+def test_work_of_unknown_length_is_reported_too(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(progress, "SECONDS_BETWEEN_LINES", 0.01)
+    with progress.busy("stress"):
+        while "stress: 0 s" not in capsys.readouterr().err:
+            pass
