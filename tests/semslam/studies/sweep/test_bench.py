@@ -24,6 +24,8 @@ seeds: [0, 1]
 config: {{keypoints: {{count: 300}}, loops: {{min_gap: 0.2}}}}
 marks: [{{system: Somebody, source: "A paper, Table 1", ate_cm: {{"synthetic:room": 1.5}}}}]
 """
+ALONE = SUITE.replace(", {name: missing, path: /nowhere}", "").replace("[0, 1]", "[0]")
+"""One sequence and one seed."""
 RESULTS = ("runs.csv", "summary.csv", "summary.json", "results.md", "results.tex", "results.html")
 ROOT = Path(__file__).resolve().parents[4]
 
@@ -98,18 +100,18 @@ def test_a_suite_killed_in_the_middle_ends_the_same(semslam: Call, suite: Path, 
     assert {path: path.stat().st_mtime_ns for path in before} == before, "finished runs are not made again"
 
 
-def test_runs_are_made_again_where_the_settings_changed(
-    semslam: Call, suite: Path, finished: Path, tmp_path: Path
-) -> None:
-    changed = tmp_path / "changed.yaml"
-    changed.write_text(SUITE.replace("min_gap: 0.2", "min_gap: 0.3"))
-    out = tmp_path / "out"
-    assert semslam("bench", changed, "--out", out).code == 1
-    (first,) = out.glob("runs/*room*/feature/default/seed0-start0/none/metrics.json")
-    before = first.stat().st_mtime_ns
-    assert semslam("bench", suite, "--out", out).code == 1
-    assert first.stat().st_mtime_ns != before
-    assert contents(out) == contents(finished)
+def test_runs_are_made_again_where_the_settings_changed(semslam: Call, finished: Path, tmp_path: Path) -> None:
+    file, out = tmp_path / "small.yaml", tmp_path / "out"
+    one = ALONE.replace("detectors: [none, thumbnail]", "detectors: [thumbnail]")
+    stamps = []
+    for text in (one.replace("min_gap: 0.2", "min_gap: 0.3"), one, one):
+        file.write_text(text)
+        assert semslam("bench", file, "--out", out).code == 0
+        (made,) = out.glob("runs/*room*/feature/default/seed0-start0/thumbnail/metrics.json")
+        stamps.append(made.stat().st_mtime_ns)
+    assert stamps[0] != stamps[1] == stamps[2]
+    (expected,) = finished.glob("runs/*room*/feature/default/seed0-start0/thumbnail/loops.jsonl")
+    assert made.with_name("loops.jsonl").read_bytes() == expected.read_bytes()
 
 
 def test_a_cluster_gives_the_same_values(
@@ -140,7 +142,7 @@ def test_no_scheduler_and_a_strange_folder_are_one_sentence(semslam: Call, suite
 
 def test_an_outside_trajectory_joins_the_table(semslam: Call, finished: Path, tmp_path: Path) -> None:
     alone = tmp_path / "alone.yaml"
-    alone.write_text(SUITE.replace(", {name: missing, path: /nowhere}", "").replace("[0, 1]", "[0]"))
+    alone.write_text(ALONE.replace("detectors: [none, thumbnail]", "detectors: [none]"))
     (run,) = finished.glob("runs/*room*/feature/default/seed0-start0/none")
     outcome = semslam(
         "bench", alone, "--out", tmp_path / "out", "--external", f"Other={run / 'trajectory.txt'}", "--json"
