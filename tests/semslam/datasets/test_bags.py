@@ -9,12 +9,14 @@ import pytest
 
 from semslam.config import Config, DatasetConfig
 from semslam.datasets import Dataset, guess_loader, open_dataset
+from semslam.datasets.realtime import RealTimeFeed
 from semslam.datasets.registration import register_depth
 from semslam.datasets.synthetic import write_tum
 from semslam.errors import DatasetError
 from semslam.geometry.camera import Intrinsics
 from semslam.geometry.se3 import exp_so3, make_transform, rotations_to_quaternions
 from semslam.runs.pipeline import run
+from semslam.types import Frame
 from tests.semslam.datasets.bags import KINDS, BagWriter
 
 CONFIG = Config(odometry="feature", detector="none").with_changes(
@@ -189,3 +191,11 @@ def test_compressed_metres_are_dequantised(tmp_path: Path) -> None:
     assert not read[:5].any()
     np.testing.assert_allclose(read[5:], depth[5:], rtol=1e-3)
     assert not any("No depth scale" in note for note in dataset.notes)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_bag_plays_in_real_time(source: Path, tmp_path: Path, kind: str) -> None:
+    dataset = open_dataset(write_bag(source / "png", tmp_path / kind, kind, compressed=False))
+    arrivals = list(RealTimeFeed(dataset, rate=30).arrivals())
+    assert all(isinstance(arrival.item, Frame) for arrival in arrivals)
+    assert np.array_equal(arrivals[-1].item.color, dataset.frame(arrivals[-1].index).color)
