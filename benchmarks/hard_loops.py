@@ -3,9 +3,9 @@
     python benchmarks/hard_loops.py "synthetic:house?way=back&rate=5" --every 3 [--detectors objects,fused] [--labels]
 
 Frames are tracked by the default odometry. A revisit is a keyframe whose place, one room with a common surface of the
-surroundings, was seen at least 15 s before (``semslam.eval.loops.places``); its kind is the least angle between its
-optical axis and that of any earlier keyframe of the place: same direction below 45 degrees, opposite above 120. Printed
-for each detector and kind:
+surroundings, was seen at least 15 s before (``semslam.eval.loops.places``); its kind is the angle between its optical
+axis and that of the earlier keyframe of the place whose camera stood nearest: same direction below 45 degrees, opposite
+above 120. Printed for each detector and kind:
 
 - ranked: share of revisits with a proposed candidate of their place that scores above every proposed candidate of a
   different place: recall without a false proposal;

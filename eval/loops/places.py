@@ -21,10 +21,10 @@ VOXEL = 0.2
 """Metres; surfaces in one voxel are the same."""
 AROUND = 4.0
 """Seconds before and after a keyframe whose views are its surroundings."""
-COMMON = 0.3
+COMMON = 0.2
 """Share of the smaller surroundings that both must see to be one place."""
 APART = 0.05
-"""Share below which they are different places; pairs between are not scored."""
+"""Share below which they are different places; pairs between, and of two rooms with a door open, are not scored."""
 MIN_GAP = 15.0
 """Seconds that lie between the keyframes of a revisit."""
 SAME_BELOW, OPPOSITE_ABOVE = 45.0, 120.0
@@ -32,7 +32,7 @@ SAME_BELOW, OPPOSITE_ABOVE = 45.0, 120.0
 
 
 class Revisit(StrEnum):
-    """From which side a place is seen again, by the least angle to any earlier keyframe of the place."""
+    """From which side a place is seen again, by the angle to the earlier keyframe of it whose camera stood nearest."""
 
     SAME = "same"
     SIDEWAYS = "sideways"
@@ -74,13 +74,13 @@ def find_places(timestamps: npt.ArrayLike, clouds: Sequence[Cloud], poses: Float
     one_room = (rooms[:, None] == rooms) | (rooms[:, None] < 0) | (rooms < 0)
     same = earlier & one_room & (common >= COMMON)
     angles = np.degrees(np.arccos(np.clip(poses[:, :3, 2] @ poses[:, :3, 2].T, -1.0, 1.0)))
-    least = np.where(same, angles, np.inf).min(axis=1, initial=np.inf)
-    return PlaceTruth(same, earlier & (~one_room | (common < APART)), tuple(_kind(angle) for angle in least))
+    apart = np.linalg.norm(poses[:, None, :3, 3] - poses[:, :3, 3], axis=2)
+    nearest = np.where(same, apart, np.inf).argmin(axis=1)
+    kinds = tuple(_kind(angles[row, at]) if same[row, at] else None for row, at in enumerate(nearest))
+    return PlaceTruth(same, earlier & (common < APART), kinds)
 
 
-def _kind(angle: float) -> Revisit | None:
-    if not np.isfinite(angle):
-        return None
+def _kind(angle: float) -> Revisit:
     if angle < SAME_BELOW:
         return Revisit.SAME
     return Revisit.SIDEWAYS if angle <= OPPOSITE_ABOVE else Revisit.OPPOSITE

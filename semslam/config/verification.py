@@ -17,7 +17,7 @@ class SubmapConfig(Section):
     max_shift: float = setting(0.8, "motion that the registration may add to the guess", unit="m", gt=0)
     max_turn: float = setting(0.35, "rotation that the registration may add to the guess", unit="rad", gt=0)
     min_points: int = setting(1500, "minimum number of points of each submap", gt=5)
-    min_overlap: float = setting(0.25, "share of either submap that must lie near the other", ge=0, le=1)
+    min_overlap: float = setting(0.3, "share of either submap that must lie near the other", ge=0, le=1)
     near: float = setting(0.1, "distance up to which a point counts as overlapping", unit="m", gt=0)
     max_free_space: float = setting(
         0.07, "points in the other's free space, as a share of these and the overlapping", ge=0, le=1

@@ -38,7 +38,7 @@ def test_another_surface_another_room_or_no_time_is_no_revisit() -> None:
     truth = find_places([0, 10, 20, 30], clouds, poses, np.array([0, 0, 0, 1]))
     assert truth.kinds == (None, None, None, None)
     assert truth.different[2, 0]
-    assert truth.different[3, 0]
+    assert not truth.different[3, 0]  # another room, seen from here
     assert not truth.different[1, 0]
 
 
@@ -47,4 +47,11 @@ def test_surroundings_are_what_was_seen_a_few_seconds_around() -> None:
     poses = np.stack([looking(0), looking(0), looking(180)])
     clouds = [wall(poses[0], 0.0), wall(poses[1], 0.0), wall(poses[2], 50.0)]
     truth = find_places([0, 20, 22], clouds, poses, np.zeros(3, dtype=np.int64))
+    assert truth.kinds[2] is Revisit.OPPOSITE
+
+
+def test_the_nearest_camera_decides() -> None:
+    """A place that was seen from both ways by two cameras is seen again as by the nearer one."""
+    poses = np.stack([looking(0, 2.0), looking(180, 0.1), looking(0)])
+    truth = find_places([0, 1, 40], [wall(T, 0.0) for T in poses], poses, np.zeros(3, dtype=np.int64))
     assert truth.kinds[2] is Revisit.OPPOSITE

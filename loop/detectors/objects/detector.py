@@ -175,7 +175,11 @@ class ObjectsDetector(RememberingDetector[Submap]):
             )
             for i, j in found.objects
         )
-        figures = {"matched_objects": float(len(found.objects)), "matched_walls": float(len(found.walls))}
+        figures = {
+            "matched_objects": float(len(found.objects)),
+            "matched_walls": float(len(found.walls)),
+            "rival": found.rival,
+        }
         labels = tuple(sorted({pair.label for pair in objects}))
         evidence = LoopEvidence(labels, figures=figures, objects=objects)
         return LoopCandidate(anchor, self._timeline.id_at(at), found.score, self.name, evidence, guess)

@@ -45,12 +45,14 @@ class SubmapMatch:
         score: share of the smaller submap's weight, and of ``PRIOR``, that found its like, 0..1.
         objects: (K, 2) matched objects of query and match.
         walls: (L, 2) matched walls.
+        rival: the votes of the best other pose, another turn or over a metre away, as a share of the best one's.
     """
 
     T_match_query: FloatArray
     score: float
     objects: IntArray
     walls: IntArray
+    rival: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -61,6 +63,15 @@ class _Pairs:
     object_weights: tuple[FloatArray, FloatArray]
     wall_weights: tuple[FloatArray, FloatArray]
     rise: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Hypothesis:
+    """A turn and a shift (2,), and their votes."""
+
+    votes: float
+    turn: float
+    shift: FloatArray
 
 
 def match_submaps(query: Submap, match: Submap, config: ObjectsConfig) -> SubmapMatch | None:
@@ -75,19 +86,30 @@ def match_submaps(query: Submap, match: Submap, config: ObjectsConfig) -> Submap
     total = min(sum(float(w.sum()) for w in (pairs.object_weights[side], pairs.wall_weights[side])) for side in (0, 1))
     if total <= 0:
         return None
-    best: tuple[float, float, FloatArray] | None = None
+    hypotheses: list[_Hypothesis] = []
     for turn in turns(query, match, config):
         shifts = _shifts(query, match, pairs, turn, config)
-        if not len(shifts):
-            continue
-        objects, walls = _votes(query, match, pairs, turn, shifts, config)
-        scores = objects.max(axis=2, initial=0.0).sum(axis=1) + walls.max(axis=2, initial=0.0).sum(axis=1)
-        at = int(scores.argmax())
-        if best is None or scores[at] > best[0]:
-            best = float(scores[at]), turn, shifts[at]
-    if best is None or best[0] <= 0:
+        if len(shifts):
+            objects, walls = _votes(query, match, pairs, turn, shifts, config)
+            scores = objects.max(axis=2, initial=0.0).sum(axis=1) + walls.max(axis=2, initial=0.0).sum(axis=1)
+            hypotheses += _two_best(turn, shifts, scores)
+    hypotheses.sort(key=lambda one: -one.votes)
+    if not hypotheses or hypotheses[0].votes <= 0:
         return None
-    return _refine(query, match, pairs, best[1], best[2], total, config)
+    rival = hypotheses[1].votes / hypotheses[0].votes if len(hypotheses) > 1 else 0.0
+    best = hypotheses[0]
+    return _refine(query, match, pairs, best.turn, best.shift, total, rival, config)
+
+
+def _two_best(turn: float, shifts: FloatArray, scores: FloatArray) -> list[_Hypothesis]:
+    """The best shift, and the best one over a metre from it, if there is one."""
+    first = int(scores.argmax())
+    far = np.linalg.norm(shifts - shifts[first], axis=1) > 1.0
+    found = [_Hypothesis(float(scores[first]), turn, shifts[first])]
+    if far.any():
+        second = int(np.where(far, scores, -1.0).argmax())
+        found.append(_Hypothesis(float(scores[second]), turn, shifts[second]))
+    return found
 
 
 def turns(query: Submap, match: Submap, config: ObjectsConfig) -> list[float]:
@@ -196,8 +218,9 @@ def _normals(azimuths: Float32Array) -> FloatArray:
 
 
 def _refine(
-    query: Submap, match: Submap, pairs: _Pairs, turn: float, shift: FloatArray, total: float, config: ObjectsConfig
-) -> SubmapMatch:
+    query: Submap, match: Submap, pairs: _Pairs, turn: float, shift: FloatArray, total: float, rival: float,
+    config: ObjectsConfig,
+) -> SubmapMatch:  # fmt: skip
     """Least squares on the pairs that agree, alternating with their choice."""
     ours, theirs = query.objects, match.objects
     for _ in range(ROUNDS):
@@ -209,7 +232,7 @@ def _refine(
     else:
         rise = pairs.rise
     T = make_transform(exp_so3((0.0, 0.0, turn)), (shift[0], shift[1], rise))
-    return SubmapMatch(T, min(value / (total + PRIOR), 1.0), chosen, walls)
+    return SubmapMatch(T, min(value / (total + PRIOR), 1.0), chosen, walls, rival)
 
 
 def _agreeing(
