@@ -46,22 +46,22 @@ def calibrate(
         stretches: number of stretches after which no more frames are read.
         ground_truth: camera poses, for the scale of depth.
     """
-    with one_blas_thread():
-        found: list[Stretch] = []
-        for part in _parts(frames):
-            stretch = begin(part, _thinned(part))
-            if stretch is not None:
-                found.append(stretch)
-            if len(found) == stretches:
-                break
-        if len(found) < ENOUGH:
-            return SensorEstimate(stretches=len(found))
-        try:
+    found: list[Stretch] = []
+    try:
+        with one_blas_thread():
+            for part in _parts(frames):
+                stretch = begin(part, _thinned(part))
+                if stretch is not None:
+                    found.append(stretch)
+                if len(found) == stretches:
+                    break
+            if len(found) < ENOUGH:
+                return SensorEstimate(stretches=len(found))
             readout, delay, depth_readout = _solve(found)
-        except np.linalg.LinAlgError:  # the stretches do not fix their poses, as on a flat wall
-            return SensorEstimate(stretches=len(found))
-        factor = UNKNOWN_FACTOR if ground_truth is None else depth_factor(found, ground_truth)
-        return SensorEstimate(readout, delay, depth_readout, factor, len(found))
+    except np.linalg.LinAlgError:  # what is seen fixes no pose
+        return SensorEstimate(stretches=len(found))
+    factor = UNKNOWN_FACTOR if ground_truth is None else depth_factor(found, ground_truth)
+    return SensorEstimate(readout, delay, depth_readout, factor, len(found))
 
 
 def _parts(frames: Iterable[Frame]) -> Iterator[list[Frame]]:

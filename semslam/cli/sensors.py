@@ -65,13 +65,17 @@ def calibrate_command(
 
 
 def _readable(dataset: "Dataset", update: "Update") -> "Iterator[Frame]":
-    """The frames whose images can be read."""
+    """The frames whose images can be read and fit the camera."""
+    from semslam.frontend.prediction import check_frame
+
     for index in range(len(dataset)):
         update(index + 1, len(dataset))
         try:
-            yield dataset.frame(index)
+            frame = dataset.frame(index)
+            check_frame(frame)
         except DatasetError:
             continue
+        yield frame
 
 
 def _setup(sequence: str, dataset: "Dataset", config: "Config") -> "CameraSetup":
