@@ -38,6 +38,7 @@ function layout(across, up, more) {
 const options = {
   responsive: true,
   displaylogo: false,
+  displayModeBar: matchMedia("(hover: hover)").matches ? "hover" : false,
   modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"],
 };
 
