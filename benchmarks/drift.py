@@ -85,7 +85,7 @@ class Rendered:
 
 
 class Remembered:
-    """A verifier that looks at each pair of frames once; a pair with other matched nodes is another pair."""
+    """A verifier that looks at each pair of frames once; one with other matched nodes or prediction is another pair."""
 
     def __init__(self, config: Config) -> None:
         self._verifier = IcpVerifier.from_config(config)
@@ -93,7 +93,8 @@ class Remembered:
 
     def verify(self, query: Keyframe, match: Keyframe, candidate: LoopCandidate) -> LoopConstraint | LoopRejection:
         """The verifier's outcome, stored from before for the same two frames."""
-        key = (query.frame_index, match.frame_index, candidate.evidence.nodes)
+        prediction = None if candidate.prediction is None else candidate.prediction.tobytes()
+        key = (query.frame_index, match.frame_index, candidate.evidence.nodes, prediction)
         if key not in self._known:
             self._known[key] = self._verifier.verify(query, match, candidate)
         return replace(self._known[key], candidate=candidate)

@@ -67,6 +67,12 @@ class LoopFollower:
             self._verified += 1
             self._following = True
 
+    def predict(self, match: int) -> Transform | None:
+        """(4, 4) T_match_query of the newest keyframe by earlier loops and odometry; None where they do not join it."""
+        if not self._following or self._frames[match] != self._frames[-1]:
+            return None
+        return invert(self._poses[match]) @ self._poses[-1]
+
     def propose(self, keyframes: Sequence[Keyframe]) -> LoopCandidate | None:
         """The next earlier keyframe to verify with the newest one, or None where no more should be.
 

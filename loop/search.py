@@ -1,6 +1,7 @@
 """Everything about loops that happens at a keyframe: label, propose, verify, follow (paper, section 3)."""
 
 from collections.abc import Collection
+from dataclasses import replace
 from typing import Self
 
 from semslam.config import Config, LoopConfig
@@ -8,13 +9,24 @@ from semslam.errors import ConfigError
 from semslam.loop.detector import LoopDetector, Remembering
 from semslam.loop.following import LoopFollower
 from semslam.loop.memory import LoopMemory, without_content
+from semslam.loop.redundancy import ClosedPlaces
 from semslam.loop.segmentation.build import build_segmenter
 from semslam.loop.segmentation.segmenter import Segmenter
 from semslam.loop.verification.submaps import ends_of
 from semslam.loop.verification.verifier import LoopVerifier, build_verifier
 from semslam.plugins import load
 from semslam.runtime.stopwatch import Stopwatch
-from semslam.types import Frame, Keyframe, KeyframeView, LabelMap, LoopCandidate, Verification
+from semslam.types import (
+    Frame,
+    Keyframe,
+    KeyframeView,
+    LabelMap,
+    LoopCandidate,
+    LoopConstraint,
+    LoopRejection,
+    RejectionReason,
+    Verification,
+)
 
 
 class LoopSearch:
@@ -40,6 +52,8 @@ class LoopSearch:
         self._segmenter = segmenter
         self._verifier = verifier
         self._follower = LoopFollower(config)
+        self._closed = ClosedPlaces()
+        self._per_place = config.per_place
         self._stopwatch = stopwatch or Stopwatch()
         self._keyframes: list[Keyframe] = []
         self._forgotten: set[int] = set()
@@ -83,7 +97,8 @@ class LoopSearch:
             labels: its segmentation, where there is one already.
 
         Returns:
-            What the verification made of each candidate, in the order in which they were verified.
+            What became of each candidate, in order; those that would repeat loops of neighbouring keyframes are refused
+            without verification.
         """
         view = self._view(keyframe, frame, labels)
         self._labels = view.labels
@@ -154,8 +169,19 @@ class LoopSearch:
         return KeyframeView(keyframe, frame.color, frame.depth, labels)
 
     def _verify(self, candidate: LoopCandidate) -> Verification:
-        query, match = ends_of(candidate, self._keyframes)
-        with self._stopwatch.stage("verify"):
-            outcome = self._verifier.verify(query, match, candidate)
+        already = self._closed.loops(candidate.query, candidate.match, self._keyframes)
+        if 0 < self._per_place <= already:
+            outcome: Verification = LoopRejection(candidate, RejectionReason.REDUNDANT, already, self._per_place)
+        else:
+            outcome = self._verified(candidate)
         self._follower.note(outcome)
+        if isinstance(outcome, LoopConstraint):
+            self._closed.note(outcome)
         return outcome
+
+    def _verified(self, candidate: LoopCandidate) -> Verification:
+        query, match = ends_of(candidate, self._keyframes)
+        predicted = replace(candidate, prediction=self._follower.predict(candidate.match))
+        with self._stopwatch.stage("verify"):
+            outcome = self._verifier.verify(query, match, predicted)
+        return replace(outcome, candidate=candidate)

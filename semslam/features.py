@@ -113,6 +113,12 @@ def hamming_distances(query: UInt8Array, train: UInt8Array) -> npt.NDArray[np.in
     return out
 
 
+def paired_distances(query: UInt8Array, train: UInt8Array) -> npt.NDArray[np.int16]:
+    """Differing bits (P,) between each of the descriptors (P, 32) and its counterpart (P, 32)."""
+    q, t = (np.ascontiguousarray(some).view(np.uint64) for some in (query, train))
+    return np.asarray(np.bitwise_count(q ^ t).sum(1, dtype=np.int16))
+
+
 def match_descriptors(query: UInt8Array, train: UInt8Array, ratio: float = 0.9) -> IntArray:
     """Pairs that are each other's best and clearly better than the query's second best.
 

@@ -15,6 +15,7 @@ from semslam.types import FloatArray, LedgerEntry
 Values = list[tuple[str, str]]
 Group = tuple[str, Values]
 REASONS = {
+    "redundant": "repeats loops of neighbouring keyframes",
     "few_matches": "few matches",
     "few_inliers": "few inliers",
     "no_cloud": "no point cloud",

@@ -2,11 +2,13 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 
-from semslam.features import PnpResult, hamming_distances, lift, mutual_matches, solve_pnp
+from semslam.config import VerificationConfig
+from semslam.features import PnpResult, lift, match_descriptors, paired_distances, solve_pnp
 from semslam.geometry.camera import Intrinsics
 from semslam.geometry.reprojection import NEAREST, measure, refine_pose, squared_errors
 from semslam.geometry.se3 import (
@@ -40,7 +42,7 @@ class Guess:
         T_match_query: (4, 4).
         covariance: (6, 6) of it, formal.
         matches: (K, 2) pairs of the ``FeaturePair`` that agree.
-        source: what it began with, "features" or "nodes".
+        source: what it began with, "prediction", "features" or "nodes".
     """
 
     T_match_query: Transform
@@ -50,33 +52,34 @@ class Guess:
 
 
 class FeaturePair:
-    """The features of two keyframes; distances between their descriptors are worked out once.
+    """The features of two keyframes; all distances between their descriptors are worked out where they are asked for.
 
     Args:
         query: the newer keyframe.
         match: the older one; only its keypoints with depth take part.
-        threshold: pixels within which a match agrees with a pose.
+        config: its ``max_reprojection`` and ``match_ratio``.
     """
 
-    def __init__(self, query: Keyframe, match: Keyframe, threshold: float) -> None:
+    def __init__(self, query: Keyframe, match: Keyframe, config: VerificationConfig) -> None:
         self._camera = query.intrinsics
         ours, theirs = query.finest, match.finest
         self._pixels = ours.pixels.astype(np.float64)
         self._deep = np.flatnonzero(theirs.depths > 0)
         self._points = theirs.points[self._deep].astype(np.float64)
-        self._gate = threshold**2
-        self._threshold = threshold
-        self._distances = hamming_distances(ours.descriptors, theirs.descriptors[self._deep])
-        self._alike = np.nonzero(self._distances <= ALIKE)
+        self._threshold, self._ratio = config.max_reprojection, config.match_ratio
+        self._gate = self._threshold**2
+        self._ours, self._theirs = ours.descriptors, theirs.descriptors[self._deep]
+        self._by_column = np.argsort(ours.pixels[:, 0], kind="stable")
+        self._sorted = np.ascontiguousarray(ours.pixels[self._by_column].T)
 
-    def matches(self, ratio: float) -> IntArray:
+    @cached_property
+    def matches(self) -> IntArray:
         """Pairs (K, 2) of query keypoints and matched points with similar descriptors, wherever they are."""
-        if not self._distances.size:
-            return np.zeros((0, 2), dtype=np.int64)
-        return mutual_matches(self._distances, ratio)
+        return match_descriptors(self._ours, self._theirs, self._ratio)
 
-    def solve(self, pairs: IntArray, seed: int) -> PnpResult | None:
-        """The pose that most of the pairs agree on."""
+    def solve(self, seed: int) -> PnpResult | None:
+        """The pose that most of ``matches`` agree on."""
+        pairs = self.matches
         return solve_pnp(self._points[pairs[:, 1]], self._pixels[pairs[:, 0]], self._camera, self._threshold, seed)
 
     def rows(self, matches: IntArray) -> IntArray:
@@ -110,12 +113,24 @@ class FeaturePair:
         ahead = points[:, 2] > NEAREST
         predicted = np.full((len(points), 2), np.inf, dtype=np.float32)
         predicted[ahead] = self._camera.project(points[ahead])
-        rows, columns = self._alike
-        near = (np.abs(self._pixels[rows].astype(np.float32) - predicted[columns]) <= radius).all(1)
-        rows, columns = rows[near], columns[near]
-        distances = self._distances[rows, columns]
+        rows, columns = self._near(predicted, radius)
+        distances = paired_distances(self._ours[rows], self._theirs[columns])
+        alike = distances <= ALIKE
+        rows, columns, distances = rows[alike], columns[alike], distances[alike]
         mutual = _nearest(rows, distances) & _nearest(columns, distances)
         return np.column_stack([rows[mutual], columns[mutual]])
+
+    def _near(self, predicted: Float32Array, radius: float) -> tuple[IntArray, IntArray]:
+        """Rows and columns (P,), in this order, of pixels and predicted places at most ``radius`` apart in u and v."""
+        u, v = self._sorted
+        first = np.searchsorted(u, predicted[:, 0] - radius, side="left")
+        count = np.searchsorted(u, predicted[:, 0] + radius, side="right") - first
+        columns = np.repeat(np.arange(len(predicted)), count)
+        place = np.arange(len(columns)) + np.repeat(first - (np.cumsum(count) - count), count)
+        near = np.abs(v[place] - np.repeat(predicted[:, 1], count)) <= radius
+        rows, columns = self._by_column[place[near]], columns[near]
+        order = np.lexsort((columns, rows))
+        return rows[order], columns[order]
 
 
 def _nearest(owners: IntArray, distances: npt.NDArray[np.int16]) -> npt.NDArray[np.bool_]:

@@ -1,5 +1,6 @@
 """From a candidate to a constraint: a pose from features, refined on the clouds, behind gates."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Self
 
@@ -10,12 +11,11 @@ from semslam.geometry.se3 import invert, orthonormalise
 from semslam.loop.verification.free_space import free_space_violation
 from semslam.loop.verification.gates import Gate, first_failed
 from semslam.loop.verification.guess import FeaturePair, Guess, pose_from_nodes
-from semslam.loop.verification.registration import Fit, measure_fit, plane_information, refine
+from semslam.loop.verification.registration import Fit, Surface, measure_fit, plane_information, refine
 from semslam.loop.verification.submaps import SubmapRegistration
 from semslam.types import (
     Covariance6,
     FloatArray,
-    IntArray,
     Keyframe,
     LoopCandidate,
     LoopConstraint,
@@ -26,10 +26,27 @@ from semslam.types import (
 
 FITNESS_SLACK = 0.95
 """Share of the initial guess's fitness that ICP's pose must keep: the loss may trade some points for a better fit."""
+ASSURED = 1.5
+"""Times ``min_inliers`` that must agree on a predicted pose, or the guesses without prediction are made as well."""
 ROTATION_GROWTH, TRANSLATION_GROWTH = 0.5, 1.5
 """Powers of the overlap that errors grow with as it falls, fitted to ground truth on two real sequences."""
 MIN_SEEN = 0.05
 """Overlap below which they grow no more; the gates refuse such loops."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Pair:
+    """Two keyframes, their features and their clouds: the query's is the source."""
+
+    query: Keyframe
+    match: Keyframe
+    features: FeaturePair
+    source: Surface
+    target: Surface
+
+    @classmethod
+    def of(cls, query: Keyframe, match: Keyframe, config: VerificationConfig) -> Self:
+        return cls(query, match, FeaturePair(query, match, config), Surface(query.cloud), Surface(match.cloud))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,61 +96,67 @@ class IcpVerifier:
         """See ``LoopVerifier``; the reason, value and limit of a rejection are those of the first gate that failed."""
         if candidate.guess is not None:
             return self._submaps.verify(query, match, candidate, candidate.guess)
-        pair = FeaturePair(query, match, self._config.max_reprojection)
-        matches = pair.matches(self._config.match_ratio)
-        guess, figures = self._best_guess(query, match, candidate, pair, matches)
-        found, limit = 0 if guess is None else len(guess.matches), self._config.min_inliers
+        pair = _Pair.of(query, match, self._config)
+        guess, figures = self._best_guess(pair, candidate)
+        found, limit = _count(guess), self._config.min_inliers
         if guess is None or found < limit:
-            scarce = len(matches) < limit
-            reason = RejectionReason.FEW_MATCHES if scarce else RejectionReason.FEW_INLIERS
-            return LoopRejection(candidate, reason, len(matches) if scarce else found, limit)
+            matches = len(pair.features.matches)
+            if matches < limit:
+                return LoopRejection(candidate, RejectionReason.FEW_MATCHES, matches, limit)
+            return LoopRejection(candidate, RejectionReason.FEW_INLIERS, found, limit)
         smaller = min(len(query.cloud), len(match.cloud))
         if smaller < self._config.min_points:
             return LoopRejection(candidate, RejectionReason.NO_CLOUD, smaller, self._config.min_points)
-        T_match_query, fit, method = self._refine(query, match, pair, guess)
-        overlap = self._overlap(query, match, T_match_query)
+        T_match_query, fit, method = self._refine(pair, guess)
+        overlap = self._overlap(pair, T_match_query)
         covariance = self._covariance(query, match, guess, T_match_query, fit, method, overlap)
         failed = first_failed(self._gates(query, match, _Estimate(T_match_query, covariance, fit, overlap)))
         if failed is not None:
             return LoopRejection(candidate, failed.reason, failed.value, failed.limit)
         return LoopConstraint(
             candidate, T_match_query, covariance, fit.fitness, fit.rmse, overlap, found, method, figures,
-            shared=pair.rows(guess.matches),
+            shared=pair.features.rows(guess.matches),
         )  # fmt: skip
 
-    def _best_guess(
-        self, query: Keyframe, match: Keyframe, candidate: LoopCandidate, pair: FeaturePair, matches: IntArray
-    ) -> tuple[Guess | None, dict[str, float]]:
+    def _best_guess(self, pair: _Pair, candidate: LoopCandidate) -> tuple[Guess | None, dict[str, float]]:
         """The guess that most features agree on, and how many agreed on each."""
-        config = self._config
+        config, features = self._config, pair.features
         figures: dict[str, float] = {}
-        starts: list[tuple[str, FloatArray]] = []
-        pnp = pair.solve(matches, self._seed)
-        if pnp is not None and pnp.inliers.sum() >= config.min_first_inliers:
-            starts.append(("features", pnp.T_ref_cam))
-            figures["first_inliers"] = float(pnp.inliers.sum())
-        nodes = pose_from_nodes(candidate.evidence.nodes, query.intrinsics, match.intrinsics)
-        if nodes is not None:
-            starts.append(("nodes", nodes[0]))
-            figures["matched_nodes"] = float(nodes[1])
         best: Guess | None = None
-        for source, T in starts:
-            guess = pair.support(T, source)
+        if candidate.prediction is not None:
+            best = features.support(candidate.prediction, "prediction")
+            figures["prediction_guess"] = float(_count(best))
+            if _count(best) >= ASSURED * config.min_inliers:
+                return best, figures
+        for source, T in self._starts(pair, candidate, figures):
+            guess = features.support(T, source)
             if _count(guess) < config.min_inliers and _count(best) < config.min_inliers:
-                T_icp = orthonormalise(refine(query.cloud, match.cloud, T, config.search_distances, config.icp))
-                guess = max(guess, pair.support(T_icp, source), key=_count)
+                T_icp = orthonormalise(refine(pair.source, pair.target, T, config.search_distances, config.icp))
+                guess = max(guess, features.support(T_icp, source), key=_count)
             figures[f"{source}_guess"] = float(_count(guess))
             best = max(best, guess, key=_count)
         return best, figures
 
-    def _refine(self, query: Keyframe, match: Keyframe, pair: FeaturePair, guess: Guess) -> tuple[FloatArray, Fit, str]:
+    def _starts(
+        self, pair: _Pair, candidate: LoopCandidate, figures: dict[str, float]
+    ) -> Iterator[tuple[str, Transform]]:
+        """Poses from matched features and from matched nodes, and what each began with."""
+        pnp = pair.features.solve(self._seed)
+        if pnp is not None and pnp.inliers.sum() >= self._config.min_first_inliers:
+            figures["first_inliers"] = float(pnp.inliers.sum())
+            yield "features", pnp.T_ref_cam
+        nodes = pose_from_nodes(candidate.evidence.nodes, pair.query.intrinsics, pair.match.intrinsics)
+        if nodes is not None:
+            figures["matched_nodes"] = float(nodes[1])
+            yield "nodes", nodes[0]
+
+    def _refine(self, pair: _Pair, guess: Guess) -> tuple[Transform, Fit, str]:
         """The better of the two poses, how it fits, and its name."""
-        config = self._config
-        T_pnp = guess.T_match_query
-        T_icp = orthonormalise(refine(query.cloud, match.cloud, T_pnp, config.icp_distances, config.icp))
-        fit_pnp, fit_icp = (measure_fit(query.cloud, match.cloud, T, config.fit_distance) for T in (T_pnp, T_icp))
+        config, T_pnp = self._config, guess.T_match_query
+        T_icp = orthonormalise(refine(pair.source, pair.target, T_pnp, config.icp_distances, config.icp))
+        fit_pnp, fit_icp = (measure_fit(pair.source, pair.target, T, config.fit_distance) for T in (T_pnp, T_icp))
         fits = fit_icp.fitness >= FITNESS_SLACK * fit_pnp.fitness
-        if fits and np.median(pair.errors(guess.matches, T_icp)) <= config.max_shift:
+        if fits and np.median(pair.features.errors(guess.matches, T_icp)) <= config.max_shift:
             return T_icp, fit_icp, "icp"
         return T_pnp, fit_pnp, "pnp"
 
@@ -154,11 +177,11 @@ class IcpVerifier:
         covariance = covariance + np.diag(floor)
         return (covariance + covariance.T) / 2
 
-    def _overlap(self, query: Keyframe, match: Keyframe, T_match_query: Transform) -> float:
+    def _overlap(self, pair: _Pair, T_match_query: Transform) -> float:
         """The smaller of the shares of either cloud that the other one meets."""
         distance = self._config.overlap_distance
-        there = measure_fit(query.cloud, match.cloud, T_match_query, distance)
-        back = measure_fit(match.cloud, query.cloud, invert(T_match_query), distance)
+        there = measure_fit(pair.source, pair.target, T_match_query, distance)
+        back = measure_fit(pair.target, pair.source, invert(T_match_query), distance)
         return min(there.fitness, back.fitness)
 
     def _gates(self, query: Keyframe, match: Keyframe, estimate: _Estimate) -> tuple[Gate, ...]:

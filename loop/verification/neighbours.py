@@ -10,8 +10,8 @@ def shared_features(query: Keyframe, match: Keyframe, config: VerificationConfig
 
     They are matched as those of a loop candidate are, by PnP RANSAC and guided matching, without clouds or nodes.
     """
-    pair = FeaturePair(query, match, config.max_reprojection)
-    pnp = pair.solve(pair.matches(config.match_ratio), seed)
+    pair = FeaturePair(query, match, config)
+    pnp = pair.solve(seed)
     if pnp is None or pnp.inliers.sum() < config.min_first_inliers:
         return None
     guess = pair.support(pnp.T_ref_cam, "features")

@@ -1,11 +1,14 @@
 """Registration of two keyframes' clouds, with Open3D."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from semslam.errors import ConfigError
+from semslam.geometry.se3 import transform_points
 from semslam.runtime.threads import one_open3d_thread
 from semslam.types import Cloud, FloatArray, IntArray, Transform
 
@@ -36,9 +39,35 @@ class Fit:
     pairs: IntArray
 
 
+class Surface:
+    """A cloud with what registration makes of it, once and where it is asked for.
+
+    Attributes:
+        cloud: the points.
+    """
+
+    def __init__(self, cloud: Cloud) -> None:
+        self.cloud = cloud
+
+    @cached_property
+    def open3d(self) -> Any:
+        """Open3D's copy of the cloud."""
+        return _open3d_cloud(self.cloud)
+
+    @cached_property
+    def tree(self) -> Any:
+        """Finds nearest points."""
+        return cKDTree(self.cloud.points.astype(np.float64), balanced_tree=False, compact_nodes=False)
+
+    def nearest(self, points: FloatArray, distance: float) -> tuple[FloatArray, IntArray]:
+        """Distances (N,) from points (N, 3) to the nearest of the cloud, and which that is; infinite beyond a limit."""
+        distances, indices = self.tree.query(points, distance_upper_bound=distance)
+        return distances, indices
+
+
 def refine(
-    source: Cloud,
-    target: Cloud,
+    source: Surface,
+    target: Surface,
     T_target_source: Transform,
     distances: tuple[float, ...],
     kind: str = "point_to_plane",
@@ -61,11 +90,11 @@ def refine(
     """
     if kind not in ICP_KINDS:
         raise ConfigError(f"There is no kind of ICP '{kind}'. Known: {', '.join(ICP_KINDS)}.")
-    if kind == "colored" and (source.colors is None or target.colors is None):
+    if kind == "colored" and (source.cloud.colors is None or target.cloud.colors is None):
         raise ConfigError("Coloured ICP needs keyframes whose clouds have colours.")
     T = T_target_source
     with one_open3d_thread():
-        moving, fixed = _open3d_cloud(source), _open3d_cloud(target)
+        moving, fixed = source.open3d, target.open3d
         for distance in distances[:-1]:
             T = _icp_pass(moving.uniform_down_sample(COARSE_STRIDE), fixed, T, distance, kind)
         for distance in distances[-1:]:
@@ -92,16 +121,15 @@ def _icp_pass(moving: Any, fixed: Any, T: Transform, distance: float, kind: str)
     return np.array(found.transformation) if found.fitness > 0 else T
 
 
-def measure_fit(source: Cloud, target: Cloud, T_target_source: Transform, distance: float) -> Fit:
-    """Count the source points that lie within ``distance`` metres of the target."""
-    from open3d.pipelines import registration
-
-    with one_open3d_thread():
-        found = registration.evaluate_registration(
-            _open3d_cloud(source), _open3d_cloud(target), distance, T_target_source
-        )
-    pairs = np.asarray(found.correspondence_set, dtype=np.int64).reshape(-1, 2)
-    return Fit(float(found.fitness), float(found.inlier_rmse), pairs)
+def measure_fit(source: Surface, target: Surface, T_target_source: Transform, distance: float) -> Fit:
+    """Find the source points that lie within ``distance`` metres of the target."""
+    if not len(source.cloud) or not len(target.cloud):
+        return Fit(0.0, 0.0, np.zeros((0, 2), dtype=np.int64))
+    points = transform_points(T_target_source, source.cloud.points.astype(np.float64))
+    off, indices = target.nearest(points, distance)
+    met = np.flatnonzero(np.isfinite(off))
+    rmse = float(np.sqrt(np.mean(off[met] ** 2))) if len(met) else 0.0
+    return Fit(len(met) / len(points), rmse, np.column_stack([met, indices[met]]))
 
 
 def plane_information(source: Cloud, target: Cloud, T_target_source: Transform, pairs: IntArray) -> FloatArray:

@@ -10,7 +10,7 @@ from semslam.geometry.se3 import FloatArray, invert, orthonormalise, rotation_an
 from semslam.geometry.voxels import voxel_keys
 from semslam.loop.verification.free_space import BoolArray, sight_of
 from semslam.loop.verification.gates import Gate, first_failed
-from semslam.loop.verification.registration import Fit, measure_fit, plane_information, refine
+from semslam.loop.verification.registration import Fit, Surface, measure_fit, plane_information, refine
 from semslam.types import Cloud, Keyframe, LoopCandidate, LoopConstraint, LoopRejection, RejectionReason, SubmapGuess
 
 
@@ -74,9 +74,10 @@ class SubmapRegistration:
         if smaller < config.min_points:
             return LoopRejection(candidate, RejectionReason.NO_CLOUD, smaller, config.min_points)
         T_guess = np.array(guess.T_match_query)
-        T = orthonormalise(refine(ours, theirs, T_guess, config.distances))
-        fit = measure_fit(ours, theirs, T, config.fit_distance)
-        there, back = measure_fit(ours, theirs, T, config.near), measure_fit(theirs, ours, invert(T), config.near)
+        source, target = Surface(ours), Surface(theirs)
+        T = orthonormalise(refine(source, target, T_guess, config.distances))
+        fit = measure_fit(source, target, T, config.fit_distance)
+        there, back = measure_fit(source, target, T, config.near), measure_fit(target, source, invert(T), config.near)
         overlap = min(there.fitness, back.fitness)
         filled = max(_free_space_share(ours, there, match, T), _free_space_share(theirs, back, query, invert(T)))
         covariance = self._covariance(ours, theirs, T, fit)

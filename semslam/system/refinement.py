@@ -8,8 +8,7 @@ import numpy as np
 
 from semslam.backend.bundle.bundle import adjust
 from semslam.backend.bundle.tracks import MatchedFeatures, join_tracks
-from semslam.backend.pose_graph import Edge, GraphSolution
-from semslam.backend.robust.repetition import discounted
+from semslam.backend.pose_graph import GraphSolution
 from semslam.config import Config
 from semslam.loop.verification.neighbours import shared_features
 from semslam.types import Intrinsics, Keyframe, Observations
@@ -37,16 +36,12 @@ def refine(
         GraphError: the optimiser failed.
     """
     settings = config.backend.bundle
-    loops: Sequence[Edge] = solution.loops
-    if observations:
-        # A map that keeps landmarks has joined old keyframes to new ones already; loops repeat much of that.
-        loops = discounted(loops)
-    elif settings.rounds and settings.closures and loops:
+    if not observations:
+        if not (settings.rounds and settings.closures and solution.loops):
+            return solution
         observations = _shared(solution, keyframes, config)
         settings = settings.model_copy(update=SEEN_TWICE)
-    else:
-        return solution
-    edges = (*solution.odometry, *loops, *solution.covisible)
+    edges = (*solution.odometry, *solution.loops, *solution.covisible)
     camera = keyframes[0].intrinsics
     observations = {key: _as_seen_by(camera, keyframes[key].intrinsics, seen) for key, seen in observations.items()}
     result = adjust(solution.poses, observations, camera, settings, edges)

@@ -98,6 +98,7 @@ class LoopCandidate:
         detector: registered name of who proposed it.
         evidence: what agreed.
         guess: the relative pose of the surroundings, from a detector that finds one; verification then registers these.
+        prediction: (4, 4) T_match_query by earlier loops and odometry, which the verification may begin with, or None.
     """
 
     query: int
@@ -106,6 +107,7 @@ class LoopCandidate:
     detector: str
     evidence: LoopEvidence = LoopEvidence()
     guess: SubmapGuess | None = None
+    prediction: Transform | None = field(default=None, compare=False, repr=False)
 
     @classmethod
     def from_plain(cls, values: dict[str, Any]) -> Self:
@@ -147,6 +149,7 @@ class LoopConstraint:
 class RejectionReason(StrEnum):
     """Why a candidate did not become a constraint, or a constraint did not stay."""
 
+    REDUNDANT = "redundant"
     FEW_MATCHES = "few_matches"
     FEW_INLIERS = "few_inliers"
     NO_CLOUD = "no_cloud"

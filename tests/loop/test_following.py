@@ -5,7 +5,7 @@ import pytest
 
 from semslam.config import LoopConfig
 from semslam.geometry.camera import Intrinsics
-from semslam.geometry.se3 import FloatArray, exp_so3, invert, make_transform
+from semslam.geometry.se3 import FloatArray, exp_so3, invert, make_transform, rotation_angle
 from semslam.loop.following import ENOUGH, LoopFollower
 from semslam.types import (
     Cloud,
@@ -141,3 +141,16 @@ def test_views_of_a_map_that_no_loop_has_joined_are_not_proposed() -> None:
     walk.step(map_id=1)
     walk.close(1)
     assert 0 in walk.proposed(), "the loop has put the newest keyframe into the first map"
+
+
+def test_earlier_loops_and_odometry_predict_the_pose_in_an_old_keyframe() -> None:
+    walk = Walk(OUT_AND_BACK, drift=0.05)
+    for number in range(15):
+        walk.step()
+        assert (walk.follower.predict(0) is None) == (number != 14)
+        if number == 13:
+            walk.close(6)
+    predicted = walk.follower.predict(5)
+    assert predicted is not None
+    off = invert(invert(walk.truth[5]) @ walk.truth[14]) @ predicted
+    assert rotation_angle(off) < 0.15, "not the 0.45 that odometry has turned too far in between"

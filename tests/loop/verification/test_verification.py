@@ -11,7 +11,7 @@ from semslam.geometry.camera import Intrinsics
 from semslam.geometry.se3 import exp_so3, invert, make_transform, rotation_angle, transform_points
 from semslam.loop.verification.free_space import free_space_violation
 from semslam.loop.verification.icp import IcpVerifier
-from semslam.loop.verification.registration import ICP_KINDS, measure_fit, refine
+from semslam.loop.verification.registration import ICP_KINDS, Surface, measure_fit, refine
 from semslam.types import (
     Cloud,
     Features,
@@ -185,11 +185,11 @@ def test_more_keypoints_serve_the_verification_where_there_are_any() -> None:
 def test_every_kind_of_icp_improves_a_poor_guess_and_repeats(kind: str) -> None:
     query, match = (coloured(keyframe(i, T), T) for i, T in enumerate((T_WORLD_QUERY, T_WORLD_MATCH)))
     guess = T_WORLD_QUERY @ make_transform(exp_so3([0.01, -0.01, 0.01]), [0.03, 0.02, -0.03])
-    first, second = (refine(query.cloud, match.cloud, guess, (0.1, 0.05), kind) for _ in range(2))
+    first, second = (refine(Surface(query.cloud), Surface(match.cloud), guess, (0.1, 0.05), kind) for _ in range(2))
     assert first.tobytes() == second.tobytes()
     assert np.linalg.norm((invert(T_WORLD_QUERY) @ first)[:3, 3]) < 0.015
     far = make_transform(np.eye(3), [100, 0, 0])
-    np.testing.assert_array_equal(refine(query.cloud, match.cloud, far, (0.1,), kind), far)
+    np.testing.assert_array_equal(refine(Surface(query.cloud), Surface(match.cloud), far, (0.1,), kind), far)
     assert isinstance(verify(query, match, icp=kind), LoopConstraint)
 
 
@@ -203,19 +203,19 @@ def coloured(keyframe: Keyframe, T_world_cam: FloatArray) -> Keyframe:
 def test_an_unknown_icp_and_missing_colours_are_one_clear_error() -> None:
     cloud = keyframe(0, T_WORLD_MATCH).cloud
     with pytest.raises(ConfigError, match="no kind of ICP"):
-        refine(cloud, cloud, np.eye(4), (0.1,), "magic")
+        refine(Surface(cloud), Surface(cloud), np.eye(4), (0.1,), "magic")
     with pytest.raises(ConfigError, match="colours"):
-        refine(cloud, cloud, np.eye(4), (0.1,), "colored")
+        refine(Surface(cloud), Surface(cloud), np.eye(4), (0.1,), "colored")
 
 
 def test_refine_pulls_a_poor_guess_in_and_leaves_a_lone_cloud() -> None:
     query, match = keyframe(1, T_WORLD_QUERY), keyframe(0, T_WORLD_MATCH)
     guess = T_WORLD_QUERY @ make_transform(exp_so3([0.01, -0.01, 0.01]), [0.03, 0.02, -0.03])
-    T = refine(query.cloud, match.cloud, guess, (0.1, 0.05))
+    T = refine(Surface(query.cloud), Surface(match.cloud), guess, (0.1, 0.05))
     assert np.linalg.norm((invert(T_WORLD_QUERY) @ T)[:3, 3]) < 0.01
     far = make_transform(np.eye(3), [100, 0, 0])
-    np.testing.assert_array_equal(refine(query.cloud, match.cloud, far, (0.1,)), far)
-    assert measure_fit(query.cloud, match.cloud, far, 0.05).fitness == 0
+    np.testing.assert_array_equal(refine(Surface(query.cloud), Surface(match.cloud), far, (0.1,)), far)
+    assert measure_fit(Surface(query.cloud), Surface(match.cloud), far, 0.05).fitness == 0
 
 
 def test_free_space_is_violated_by_points_in_front_only() -> None:
@@ -271,3 +271,18 @@ def test_no_wrong_place_is_accepted_among_the_keyframes_of_three_places(shared) 
         if here != there and isinstance(verifier.verify(query, match, CANDIDATE), LoopConstraint)
     ]
     assert accepted == []
+
+
+def test_a_prediction_near_the_truth_saves_matching_and_a_bad_one_costs_nothing() -> None:
+    query, match = keyframe(1, T_WORLD_QUERY), keyframe(0, T_WORLD_MATCH)
+    verifier = IcpVerifier.from_config(Config())
+    truth = invert(T_WORLD_MATCH) @ T_WORLD_QUERY
+    near = truth @ make_transform(exp_so3([0.004, -0.003, 0.002]), [0.01, -0.01, 0.01])
+    far = truth @ make_transform(exp_so3([0.0, 0.5, 0.0]), [1.0, 0.0, 0.0])
+    alone, led, misled = (verifier.verify(query, match, replace(CANDIDATE, prediction=T)) for T in (None, near, far))
+    assert isinstance(alone, LoopConstraint)
+    assert isinstance(led, LoopConstraint)
+    assert isinstance(misled, LoopConstraint)
+    assert "features_guess" not in led.figures
+    np.testing.assert_allclose(led.T_match_query, alone.T_match_query, atol=1e-3)
+    np.testing.assert_array_equal(misled.T_match_query, alone.T_match_query)

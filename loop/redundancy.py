@@ -1,0 +1,39 @@
+"""Loops that would repeat what loops between neighbouring keyframes have closed already."""
+
+from collections.abc import Sequence
+
+from semslam.types import Keyframe, LoopConstraint
+
+NEIGHBOURHOOD = 2
+"""Keyframes by which either end of a loop may lie from another's, in time, where both close the same two places."""
+
+
+class ClosedPlaces:
+    """Counts the verified loops between two places.
+
+    The same camera looks at the same surfaces from nearly the same poses, so loops between two places err alike: the
+    third adds hardly anything to the first two.
+    """
+
+    def __init__(self) -> None:
+        self._matches: dict[int, list[int]] = {}
+
+    def note(self, loop: LoopConstraint) -> None:
+        """Take in a verified loop."""
+        self._matches.setdefault(loop.candidate.query, []).append(loop.candidate.match)
+
+    def loops(self, query: int, match: int, keyframes: Sequence[Keyframe]) -> int:
+        """How many verified loops join the neighbours of two keyframes; only keyframes of one map are neighbours.
+
+        Args:
+            query: the newer keyframe, the newest so far.
+            match: the older one.
+            keyframes: all so far; ``keyframes[i].id`` is i.
+        """
+        queries, matches = keyframes[query].map_id, keyframes[match].map_id
+        return sum(
+            abs(other - match) <= NEIGHBOURHOOD and keyframes[other].map_id == matches
+            for near in range(query - NEIGHBOURHOOD, query + 1)
+            for other in self._matches.get(near, ())
+            if keyframes[near].map_id == queries
+        )

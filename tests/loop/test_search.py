@@ -1,0 +1,99 @@
+"""The search as a whole: which candidates are verified, with what, and what becomes of the others."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from semslam.config import LoopConfig
+from semslam.geometry.camera import Intrinsics
+from semslam.loop.redundancy import NEIGHBOURHOOD
+from semslam.loop.search import LoopSearch
+from semslam.types import (
+    Cloud,
+    Features,
+    Frame,
+    Keyframe,
+    KeyframeView,
+    LoopCandidate,
+    LoopConstraint,
+    LoopRejection,
+    RejectionReason,
+)
+
+CAMERA = Intrinsics(64, 48, 60.0, 60.0, 31.5, 23.5)
+FIRST = 10
+
+
+class EveryOldOne:
+    """Proposes each of the first keyframes for every later one."""
+
+    needs_labels = False
+
+    def query(self, view: KeyframeView) -> list[LoopCandidate]:
+        late = view.keyframe.id >= FIRST
+        return [LoopCandidate(view.keyframe.id, match, 0.5, "every") for match in range(FIRST) if late]
+
+    def add(self, view: KeyframeView) -> None:
+        pass
+
+
+@dataclass
+class Standing:
+    """Confirms every candidate: the camera has not moved."""
+
+    asked: list[LoopCandidate] = field(default_factory=list)
+
+    def verify(self, query: Keyframe, match: Keyframe, candidate: LoopCandidate) -> LoopConstraint:
+        self.asked.append(candidate)
+        return LoopConstraint(candidate, np.eye(4), np.eye(6), 1.0, 0.0, 1.0, 50, "exact")
+
+
+def keyframe(number: int, map_id: int = 0) -> Keyframe:
+    empty = np.zeros((0, 2), np.float32)
+    bytes_, none = np.zeros((0, 32), np.uint8), empty[:, 0]
+    features = Features(empty, none, none.astype(np.uint8), none, bytes_, np.zeros((0, 3), np.float32))
+    cloud = Cloud(np.zeros((0, 3), np.float32), np.zeros((0, 3), np.float32))
+    return Keyframe(number, number, float(number), np.eye(4), map_id, CAMERA, features, cloud)
+
+
+def search(config: LoopConfig, maps: list[int]) -> tuple[Standing, list[list[LoopConstraint | LoopRejection]]]:
+    verifier = Standing()
+    search = LoopSearch(EveryOldOne(), None, verifier, config)  # type: ignore[arg-type]
+    images = np.zeros((48, 64, 3), np.uint8), np.zeros((48, 64), np.float32)
+    found = [
+        search.search(keyframe(number, map_id), Frame(number, float(number), *images, CAMERA))
+        for number, map_id in enumerate(maps)
+    ]
+    return verifier, found
+
+
+def closed(outcomes: list[LoopConstraint | LoopRejection]) -> list[int]:
+    return [one.candidate.match for one in outcomes if isinstance(one, LoopConstraint)]
+
+
+def test_two_loops_between_two_places_are_enough_and_the_others_are_recorded_as_redundant() -> None:
+    verifier, found = search(LoopConfig(follow=0), [0] * (FIRST + NEIGHBOURHOOD + 2))
+    assert closed(found[FIRST]) == [0, 1, 3, 4, 6, 7, 9], "one that lies within two keyframes of two loops is left out"
+    for outcomes in found[FIRST + 1 : FIRST + NEIGHBOURHOOD + 1]:
+        assert closed(outcomes) == []
+        assert len(outcomes) == FIRST, "none is dropped in silence"
+        assert {one.reason for one in outcomes if isinstance(one, LoopRejection)} == {RejectionReason.REDUNDANT}
+    assert closed(found[-1]), "later keyframes are another place in time"
+    assert len(verifier.asked) == sum(len(closed(outcomes)) for outcomes in found)
+
+
+def test_zero_sets_no_maximum() -> None:
+    verifier, found = search(LoopConfig(follow=0, per_place=0), [0] * (FIRST + 3))
+    assert [len(closed(outcomes)) for outcomes in found[FIRST:]] == [FIRST] * 3
+    assert len(verifier.asked) == 3 * FIRST
+
+
+def test_loops_of_another_map_close_nothing_for_this_one() -> None:
+    _, found = search(LoopConfig(follow=0), [0] * (FIRST + 1) + [1])
+    assert closed(found[-1]) == closed(found[FIRST]), "a new map needs its own loops"
+
+
+def test_later_candidates_are_verified_with_a_prediction_that_the_outcome_does_not_keep() -> None:
+    verifier, found = search(LoopConfig(follow=0), [0] * (FIRST + 1))
+    assert [candidate.prediction is None for candidate in verifier.asked] == [True] + [False] * 6
+    assert all(outcome.candidate.prediction is None for outcome in found[FIRST])
