@@ -5,7 +5,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from semslam.errors import ConfigError
 from semslam.geometry.se3 import transform_points
@@ -57,6 +56,8 @@ class Surface:
     @cached_property
     def tree(self) -> Any:
         """Finds nearest points."""
+        from scipy.spatial import cKDTree
+
         return cKDTree(self.cloud.points.astype(np.float64), balanced_tree=False, compact_nodes=False)
 
     def nearest(self, points: FloatArray, distance: float) -> tuple[FloatArray, IntArray]:

@@ -1,4 +1,4 @@
-"""Clouds and meshes as PLY, by Open3D."""
+"""Clouds as binary PLY, and meshes by Open3D."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -13,6 +13,15 @@ from semslam.types import Cloud
 if TYPE_CHECKING:
     from open3d.geometry import TriangleMesh
 
+PLY_TYPES = {
+    "float32": "float",
+    "float64": "double",
+    "uint8": "uchar",
+    "uint16": "ushort",
+    "int32": "int",
+}
+"""Names of numbers in PLY by those of numpy."""
+
 
 def write_cloud(path: Path, cloud: Cloud, columns: Mapping[str, npt.NDArray[Any]] | None = None) -> None:
     """Write a cloud with normals, its colours where they are known, and further values of its points.
@@ -25,16 +34,20 @@ def write_cloud(path: Path, cloud: Cloud, columns: Mapping[str, npt.NDArray[Any]
     Raises:
         ResultsError: the file cannot be written.
     """
-    import open3d as o3d
-
-    points = o3d.t.geometry.PointCloud(tensor(cloud.points))
-    points.point["normals"] = tensor(cloud.normals)
+    fields: dict[str, npt.NDArray[Any]] = {name: cloud.points[:, i] for i, name in enumerate("xyz")}
+    fields |= {name: cloud.normals[:, i] for i, name in enumerate(("nx", "ny", "nz"))}
     if cloud.colors is not None:
-        points.point["colors"] = tensor(cloud.colors)
-    for name, values in (columns or {}).items():
-        points.point[name] = tensor(values[:, None])
-    if not o3d.t.io.write_point_cloud(path, points) and len(cloud):
-        raise ResultsError(f"The map {path} cannot be written.")
+        fields |= {name: cloud.colors[:, i] for i, name in enumerate(("red", "green", "blue"))}
+    fields |= columns or {}
+    rows = np.empty(len(cloud), [(name, values.dtype.newbyteorder("<")) for name, values in fields.items()])
+    for name, values in fields.items():
+        rows[name] = values
+    listed = "".join(f"property {PLY_TYPES[values.dtype.name]} {name}\n" for name, values in fields.items())
+    header = f"ply\nformat binary_little_endian 1.0\nelement vertex {len(cloud)}\n{listed}end_header\n"
+    try:
+        path.write_bytes(header.encode("ascii") + rows.tobytes())
+    except OSError as error:
+        raise ResultsError(f"The map {path} cannot be written: {error.strerror or error}.") from error
 
 
 def write_mesh(path: Path, mesh: "TriangleMesh") -> None:
