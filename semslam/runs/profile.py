@@ -3,15 +3,18 @@
 from collections import defaultdict
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from semslam.eval.profile import ProfileDrawing, draw_profile
 from semslam.runs.files import write_json, writing
 from semslam.runs.latency import latency
 from semslam.runtime.stopwatch import Span
 
 PROFILE, PICTURE = "profile.json", "profile.png"
+if TYPE_CHECKING:
+    from semslam.eval.profile import ProfileDrawing
+
 MAIN, READING, LOOPS = "MainThread", "semslam-reader", "semslam-worker"
 """Names of threads, or how they begin."""
 
@@ -77,6 +80,8 @@ def write_profile(directory: Path, profile: Profile) -> None:
     Raises:
         ResultsError: it cannot be written.
     """
+    from semslam.eval.profile import draw_profile  # a run without pictures does without matplotlib
+
     tracking = latency([seconds for _, seconds in profile.tracking], 1e3)
     loops = latency([seconds for _, seconds in profile.loops], 1.0)
     content = {
@@ -92,7 +97,9 @@ def write_profile(directory: Path, profile: Profile) -> None:
         picture.write_bytes(draw_profile(_drawing(profile)))
 
 
-def _drawing(profile: Profile) -> ProfileDrawing:
+def _drawing(profile: Profile) -> "ProfileDrawing":
+    from semslam.eval.profile import ProfileDrawing
+
     busy: defaultdict[str, defaultdict[str, list[tuple[float, float]]]] = defaultdict(lambda: defaultdict(list))
     for span in profile.spans:
         busy[_where(span, profile.process)][span.stage].append((span.start - profile.start, span.seconds))
