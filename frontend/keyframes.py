@@ -1,6 +1,6 @@
 """Which frames become keyframes, and what is kept of them (paper, section 3.1.1)."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -67,6 +67,22 @@ class EveryNth:
         return pose.index % self.step == 0
 
 
+class DetailExtractor:
+    """Finds the further keypoints of a keyframe, by which loops are verified."""
+
+    def __init__(self, config: Config) -> None:
+        self._extractor = FeatureExtractor(config.verification.keypoints)
+
+    def complete(self, keyframe: Keyframe, frame: Frame) -> Keyframe:
+        """A keyframe with its details.
+
+        Args:
+            keyframe: one without.
+            frame: its images.
+        """
+        return replace(keyframe, details=self._extractor.extract(frame))
+
+
 class KeyframeBuilder:
     """Adds up the odometry's motions, decides which frames become keyframes, and makes these.
 
@@ -80,7 +96,7 @@ class KeyframeBuilder:
         self._config = config.keyframes
         self._policy = policy or ByTimeAndMotion(config.keyframes)
         self._extractor = FeatureExtractor(config.keypoints)
-        self._details = FeatureExtractor(config.verification.keypoints) if details else None
+        self._details = DetailExtractor(config) if details else None
         self._pose = TrackedPose(-1, 0.0, np.eye(4), 0)
         self._last: TrackedPose | None = None
         self._count = 0
@@ -124,7 +140,6 @@ class KeyframeBuilder:
             intrinsics=frame.intrinsics,
             features=self._extractor.extract(frame),
             cloud=make_cloud(frame, self._config),
-            details=None if self._details is None else self._details.extract(frame),
         )
         self._count += 1
-        return keyframe
+        return keyframe if self._details is None else self._details.complete(keyframe, frame)

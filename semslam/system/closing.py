@@ -7,6 +7,7 @@ from functools import partial
 from semslam.backend.graph.products import Edge
 from semslam.backend.incremental import IncrementalPoseGraph
 from semslam.config import Config
+from semslam.frontend.keyframes import DetailExtractor
 from semslam.loop.detector import NoLoops
 from semslam.loop.search import LoopSearch
 from semslam.loop.verification.verifier import LoopVerifier, build_verifier
@@ -14,7 +15,7 @@ from semslam.runtime.stopwatch import Span, Stopwatch
 from semslam.runtime.usage import ProcessUsage, usage_now
 from semslam.runtime.workers import Worker, WorkerKind, make_worker
 from semslam.system.shedding import SheddingVerifier
-from semslam.types import Frame, Keyframe, LabelMap, LoopConstraint, Transform, Verification
+from semslam.types import Features, Frame, Keyframe, LabelMap, LoopConstraint, Transform, Verification
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,6 +43,7 @@ class KeyframeAnswer:
 
     Attributes:
         keyframe: its id.
+        details: its keypoints for the verification.
         verifications: what the verification made of each candidate, in order.
         T_world_odom: (4, 4) takes poses of the keyframe's map from odometry's frame to the world as the loops have it.
         accepted: match and query of the loops that the live graph follows from this keyframe on.
@@ -52,6 +54,7 @@ class KeyframeAnswer:
     """
 
     keyframe: int
+    details: Features | None
     verifications: tuple[Verification, ...]
     T_world_odom: Transform
     accepted: tuple[tuple[int, int], ...]
@@ -97,6 +100,7 @@ class LoopClosing:
             T_world_odom = self._graph.correction(keyframe.id)
         return KeyframeAnswer(
             keyframe=keyframe.id,
+            details=keyframe.details,
             verifications=verifications,
             T_world_odom=T_world_odom,
             accepted=change.accepted,
@@ -131,9 +135,12 @@ def _make_closing(config: Config, verifier: LoopVerifier | None) -> Callable[[Ke
     shedding = SheddingVerifier(verifier or build_verifier(config), config.loops.max_behind)
     search = LoopSearch.from_config(config, stopwatch, verifier=shedding)
     closing = LoopClosing(search, IncrementalPoseGraph(config.backend), stopwatch)
+    details = DetailExtractor(config)
 
     def work(job: KeyframeJob) -> KeyframeAnswer:
         shedding.behind = job.behind
-        return closing.close(job)
+        with stopwatch.stage("details"):
+            keyframe = details.complete(job.keyframe, job.frame)
+        return closing.close(replace(job, keyframe=keyframe))
 
     return work

@@ -121,7 +121,7 @@ class Slam:
         closing = build_closing(config, worker, verifier)
         return cls(
             odometry=load("semslam.odometry", config.odometry).from_config(config),
-            builder=KeyframeBuilder(config, details=closing is not None),
+            builder=KeyframeBuilder(config, details=False),  # loop closing adds them
             closing=closing,
             graph=PoseGraph(config.backend),
             config=config,
@@ -252,6 +252,7 @@ class Slam:
         for answer in answers:
             self._listener(answer)
             self._stopwatch.add(answer.spans)
+            self._keyframes[answer.keyframe] = replace(self._keyframes[answer.keyframe], details=answer.details)
             self._outcomes += answer.verifications
             for verification in answer.verifications:
                 if isinstance(verification, LoopConstraint):
