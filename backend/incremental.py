@@ -1,6 +1,7 @@
 """Poses while the run goes on: a running estimate beside the pose graph, and a judgement of loops beside both."""
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy.typing as npt
@@ -73,6 +74,7 @@ class IncrementalPoseGraph:
         self._odometry_scale = self._loop_scale = 1.0
         self._retry_at, self._due = FIRST_RETRY, False
         self._judgement: Steps[None] | None = None
+        self._paused = False
 
     @property
     def loops(self) -> tuple[LoopConstraint, ...]:
@@ -215,7 +217,7 @@ class IncrementalPoseGraph:
             self._due = True
         if self._judgement is None and self._due:
             self._judgement, self._due = self._judge(), False
-        self._go_on()
+        self._go_on(len(fresh))
 
     def _extend(self, estimate: RunningEstimate, keys: Sequence[int], edges: Sequence[_Trusted], scale: float) -> None:
         """Add keyframes, each where odometry takes it from one that has a pose, or else where it was given."""
@@ -239,19 +241,17 @@ class IncrementalPoseGraph:
         """Steps, or loops to try, that one update may cost."""
         return max(1, BUDGET // max(len(self._keys), 1))
 
-    def _go_on(self) -> None:
-        """Do the steps of a judgement that one update may cost."""
-        judgement = self._judgement
-        for _ in range(self._affordable):
+    def _go_on(self, tried: int) -> None:
+        """Do the steps of a judgement that one update may cost besides trying loops; one at least every other time."""
+        steps = self._affordable - tried
+        self._paused = steps <= 0 and not self._paused
+        for _ in range(0 if self._paused else max(steps, 1)):
+            judgement, self._judgement = self._judgement, None
             if judgement is None:
                 return
-            try:
+            with suppress(StopIteration):
                 next(judgement)
-            except StopIteration:
-                judgement = self._judgement = None
-            except GraphError:
-                self._judgement = None
-                raise
+                self._judgement = judgement
 
     def _judge(self) -> Steps[None]:
         """Judge all loops there are now, and make a new estimate from the outcome."""

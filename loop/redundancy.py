@@ -11,8 +11,8 @@ NEIGHBOURHOOD = 2
 class ClosedPlaces:
     """Counts the verified loops between two places.
 
-    The same camera looks at the same surfaces from nearly the same poses, so loops between two places err alike: the
-    third adds hardly anything to the first two.
+    The same camera looks at the same surfaces from nearly the same poses, so loops between two places err alike: each
+    further one adds less.
     """
 
     def __init__(self) -> None:

@@ -14,7 +14,7 @@ class LoopConfig(Section):
         3, "maximum number of candidates predicted from the last verified loop and odometry; 0 = none", ge=0
     )
     per_place: int = setting(
-        2, "verified loops between the same two places after which no more are verified; 0 = no maximum", ge=0
+        4, "verified loops between the same two places after which no more are verified; 0 = no maximum", ge=0
     )
     delay: int = setting(1, "number of keyframes after which a loop moves the live poses", ge=0)
     max_behind: int = setting(

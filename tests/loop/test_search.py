@@ -72,7 +72,7 @@ def closed(outcomes: list[LoopConstraint | LoopRejection]) -> list[int]:
 
 
 def test_two_loops_between_two_places_are_enough_and_the_others_are_recorded_as_redundant() -> None:
-    verifier, found = search(LoopConfig(follow=0), [0] * (FIRST + NEIGHBOURHOOD + 2))
+    verifier, found = search(LoopConfig(follow=0, per_place=2), [0] * (FIRST + NEIGHBOURHOOD + 2))
     assert closed(found[FIRST]) == [0, 1, 3, 4, 6, 7, 9], "one that lies within two keyframes of two loops is left out"
     for outcomes in found[FIRST + 1 : FIRST + NEIGHBOURHOOD + 1]:
         assert closed(outcomes) == []
@@ -89,11 +89,11 @@ def test_zero_sets_no_maximum() -> None:
 
 
 def test_loops_of_another_map_close_nothing_for_this_one() -> None:
-    _, found = search(LoopConfig(follow=0), [0] * (FIRST + 1) + [1])
+    _, found = search(LoopConfig(follow=0, per_place=2), [0] * (FIRST + 1) + [1])
     assert closed(found[-1]) == closed(found[FIRST]), "a new map needs its own loops"
 
 
 def test_later_candidates_are_verified_with_a_prediction_that_the_outcome_does_not_keep() -> None:
-    verifier, found = search(LoopConfig(follow=0), [0] * (FIRST + 1))
+    verifier, found = search(LoopConfig(follow=0, per_place=2), [0] * (FIRST + 1))
     assert [candidate.prediction is None for candidate in verifier.asked] == [True] + [False] * 6
     assert all(outcome.candidate.prediction is None for outcome in found[FIRST])
