@@ -138,3 +138,17 @@ def test_a_score_of_few_poses_comes_with_a_warning(semslam: Call, tmp_path: Path
         "The errors are of 5 of 40 poses (12 %)" in semslam("eval", tmp_path / "poses.txt", tmp_path / "truth.txt").err
     )
     assert "errors are of" not in semslam("eval", tmp_path / "truth.txt", tmp_path / "poses.txt").err
+
+
+def test_loops_and_runs_print_json(semslam: Call, tmp_path: Path) -> None:
+    """What is on standard output is what stands in the file, and nothing else."""
+    scene, out = "synthetic:room?frames=10&width=160", tmp_path / "loops"
+    few = ("--odometry", "feature", "--set", "loops.min_gap=0.3", "--every", 2, "--out", out)
+    outcome = semslam("loops", scene, "--detectors", "thumbnail", *few, "--json")
+    assert outcome.code == 0, outcome.err
+    assert json.loads(outcome.out) == json.loads((out / "loops.json").read_text())
+    outcome = semslam(
+        "run", scene, "--odometry", "feature", "--detector", "none", "--no-plots", "--out", tmp_path / "run", "--json"
+    )
+    assert outcome.code == 0, outcome.err
+    assert json.loads(outcome.out) == json.loads((tmp_path / "run" / "metrics.json").read_text())

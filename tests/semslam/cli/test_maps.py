@@ -89,8 +89,9 @@ def test_a_map_needs_a_run_and_its_images(semslam: Call, saved: Path, tmp_path: 
 
 
 def test_two_parts_of_one_run_that_see_the_same_hold_no_change(semslam: Call, saved: Path, tmp_path: Path) -> None:
-    outcome = semslam("diff", saved, "--at", 1.5, "--voxel", 0.1, "--out", tmp_path / "changes.json")
+    outcome = semslam("diff", saved, "--at", 1.5, "--voxel", 0.1, "--json", "--out", tmp_path / "changes.json")
     assert outcome.code == 0, outcome.err
+    assert json.loads(outcome.out) == []
     assert json.loads((tmp_path / "changes.json").read_text()) == []
 
 

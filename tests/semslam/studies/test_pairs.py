@@ -40,6 +40,8 @@ def test_pairs_json_keeps_its_contract(semslam: Call, tmp_path: Path) -> None:
     outcome = semslam("pairs", "--folder", a, "--folder", b, "--detectors", "thumbnail,hog", "--out", out)
     assert outcome.code == 0, outcome.err
     written = json.loads((out / "pairs.json").read_text())
+    again = semslam("pairs", "--folder", a, "--folder", b, "--detectors", "thumbnail,hog", "--out", out, "--json")
+    assert json.loads(again.out) == written
     assert list(written) == ["detectors"]
     assert [row["detector"] for row in written["detectors"]] == ["thumbnail", "hog"]
     for row in written["detectors"]:
