@@ -192,7 +192,8 @@ def _checked(directory: Path) -> Path:
             raise ResultsError(f"{directory} belongs to another user; name another folder with --out.")
         foreign = foreign_files(directory)
     if foreign:
-        more = f" and {len(foreign) - 1} more files" if len(foreign) > 1 else ""
+        others = len(foreign) - 1
+        more = f" and {others} more file{'' if others == 1 else 's'}" if others else ""
         raise ResultsError(
             f"{directory} holds something that no run wrote ({foreign[0]}{more}); name another folder with --out."
         )

@@ -356,3 +356,11 @@ def test_an_archive_that_unpacks_beyond_the_disk_is_refused(
     with pytest.raises(DatasetError, match="unpacks to more than"):
         download("fr1/room", tmp_path, base_url=server.url)
     assert names(tmp_path) == []
+
+
+def test_a_server_that_sends_without_end_is_cut_off(
+    server: Server, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("semslam.datasets.download.MAX_ARCHIVE_BYTES", 100)
+    with pytest.raises(DatasetError, match="is too large"):
+        download("fr1/room", tmp_path, base_url=server.url)
