@@ -21,6 +21,8 @@ KINECT_READOUT = 0.026
 """Seconds that the colour camera of a Kinect or Xtion takes from its first row to its last; estimated on fr1/rpy."""
 LISTS = ("rgb.txt", "depth.txt", "groundtruth.txt", "accelerometer.txt")
 COMMENT_BYTES = 4096
+WRITTEN = "written by semslam"
+"""In the comment above the lists of a sequence that was converted."""
 ROS_DEFAULT = Intrinsics(640, 480, 525.0, 525.0, 319.5, 239.5)
 
 
@@ -121,9 +123,12 @@ of the image, and the ground truth is mirrored instead (``mirror_y``)."""
 def known_sequence(folder: Path) -> KnownSequence | None:
     """The family a folder belongs to, by its content or else by its name.
 
+    A sequence that ``semslam convert`` has written belongs to none: its poses are the camera's already.
     Content: ICL-NUIM's ``*.gt.freiburg``, or a data set's own name in the comments above a list (TUM and Bonn write
     the name of the bag there). Name: the folder's own, or a parent named just "fr1" or "freiburg1".
     """
+    if WRITTEN in _comments(folder / "rgb.txt"):
+        return None
     return _known_by_content(folder) or _known_by_name(folder)
 
 

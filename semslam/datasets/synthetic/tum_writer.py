@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 
 from semslam.datasets.camera_file import CAMERA_FILE, write_camera
-from semslam.datasets.cameras import TUM_DEPTH_SCALE
+from semslam.datasets.cameras import TUM_DEPTH_SCALE, WRITTEN
 from semslam.datasets.dataset import Dataset
 from semslam.datasets.tum_format import write_trajectory
 from semslam.errors import DatasetError
@@ -41,7 +41,7 @@ def write_tum(
             raise DatasetError(f"The folder {folder} is not empty; a sequence needs one of its own.")
         for name in ("rgb", "depth", *(("labels",) if labels else ())):
             (folder / name).mkdir(parents=True, exist_ok=True)
-        lists = {"rgb": ["# timestamp filename"], "depth": ["# timestamp filename"]}
+        lists = {name: [f"# timestamp filename, {WRITTEN}"] for name in ("rgb", "depth")}
         for frame in dataset:
             stamp = f"{frame.timestamp:.9f}"
             color, depth = f"rgb/{stamp}.{'jpg' if jpeg else 'png'}", f"depth/{stamp}.png"

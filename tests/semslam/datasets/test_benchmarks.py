@@ -10,6 +10,7 @@ import pytest
 from semslam.config import DatasetConfig
 from semslam.datasets import Dataset, open_dataset
 from semslam.datasets.camera_file import write_camera
+from semslam.datasets.synthetic import write_tum
 from semslam.errors import SemslamError
 from semslam.geometry.camera import Intrinsics
 from tests.semslam.datasets import samples
@@ -212,3 +213,15 @@ def test_a_damaged_file_is_named_in_one_sentence(make: object, file: str, conten
     with pytest.raises(SemslamError, match=Path(file).name) as caught:
         open_dataset(folder)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["rgbd_bonn_balloon", "living_room_traj0_frei_png"])
+def test_a_converted_sequence_keeps_its_poses_and_camera(tmp_path: Path, name: str) -> None:
+    """Whatever its folder is called: the poses of these families are moved or mirrored once, when they are read."""
+    original = open_dataset(samples.make_replica(tmp_path))
+    write_tum(original, tmp_path / name)
+    converted = open_dataset(tmp_path / name)
+    np.testing.assert_allclose(positions(converted), positions(original), atol=1e-9)
+    assert converted.timestamps == pytest.approx(original.timestamps, abs=1e-9)
+    assert converted.intrinsics == original.intrinsics
+    assert converted.notes == []
