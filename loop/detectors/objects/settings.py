@@ -23,4 +23,4 @@ class ObjectsConfig(Section):
     use_labels: bool = setting(True, "compare classes; otherwise everything is of one class")
     use_look: bool = setting(True, "compare how objects look")
     use_structure: bool = setting(True, "match walls too")
-    min_score: float = setting(0.18, "share of matched objects and walls that makes a candidate", ge=0, le=1)
+    min_score: float = setting(0.25, "share of matched objects and walls that makes a candidate", ge=0, le=1)
