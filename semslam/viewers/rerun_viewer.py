@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 
 from semslam.eval.style import ACCEPTED, ODOMETRY, OPTIMISED, OUTCOMES, REJECTED, TRUTH
-from semslam.geometry.se3 import rotations_to_quaternions, transform_points
+from semslam.geometry.se3 import Points3, rotations_to_quaternions, transform_points
 from semslam.loop.detectors.semantic.nodes import extract_nodes
 from semslam.loop.detectors.semantic.settings import NodeConfig
 from semslam.loop.segmentation.classes import PALETTE
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 JPEG_QUALITY = 75
 IMAGE_INTERVAL = 0.09
 """Seconds between two colour images that are shown: ten a second; compressing them is most of a viewer's work."""
+PNG_FAST = [cv2.IMWRITE_PNG_COMPRESSION, 1, cv2.IMWRITE_PNG_FILTER, cv2.IMWRITE_PNG_FILTER_NONE]
 MILLIMETRES = 1000.0
 FRUSTUM = 0.25
 """Metres from the camera's centre at which its image is drawn."""
@@ -54,6 +55,7 @@ class RerunViewer:
         self._stream = stream
         self._last: FrameState | None = None
         self._next_image = -np.inf
+        self._way: list[Points3] = []  # of each frame since it was shown: by odometry alone, with the loops
         self._poses: list[Transform] = []
         self._landmarks: set[int] = set()
         self._unlabelled: dict[int, Frame] = {}
@@ -68,13 +70,12 @@ class RerunViewer:
         T = state.T_world_cam
         self._stream.log(CAMERA, rr.Transform3D(translation=T[:3, 3], mat3x3=T[:3, :3]))
         last, self._last = self._last, state
-        if last is not None and last.map_id == state.map_id:
-            for name, color, before, now in (
-                ("odometry", ODOMETRY.color, last.T_odom_cam, state.T_odom_cam),
-                ("path", OPTIMISED.color, last.T_world_cam, T),
-            ):
-                step = np.stack([before[:3, 3], now[:3, 3]])
-                self._stream.log(f"{LIVE}/{name}", rr.LineStrips3D([step], colors=_rgb(color)))
+        if last is not None and last.map_id != state.map_id:
+            self._show_way()
+            self._way = []
+        self._way.append(np.stack([state.T_odom_cam[:3, 3], T[:3, 3]]))
+        if state.keyframe is not None:
+            self._show_way()
         self._stream.log(f"{TRACKING}/inliers", rr.Scalars(state.motion.inliers))
         if frame is not None and (state.keyframe is not None or state.timestamp >= self._next_image):
             self._next_image = state.timestamp + IMAGE_INTERVAL
@@ -88,7 +89,7 @@ class RerunViewer:
         T = scene.keyframe.T_odom_cam if self._last is None else self._last.T_world_cam
         self._poses.append(T)
         depth = np.rint(scene.frame.depth * MILLIMETRES).clip(0, 65535).astype(np.uint16)
-        png = cv2.imencode(".png", depth, [cv2.IMWRITE_PNG_COMPRESSION, 1])[1].tobytes()
+        png = cv2.imencode(".png", depth, PNG_FAST)[1].tobytes()
         self._stream.log(f"{IMAGE}/depth", rr.EncodedDepthImage(blob=png, media_type="image/png", meter=MILLIMETRES))
         cloud = scene.keyframe.cloud
         self._stream.log(
@@ -114,6 +115,7 @@ class RerunViewer:
 
     def finish(self, finished: Callable[[], FinishedRun]) -> None:
         """See ``Viewer``."""
+        self._show_way()
         self._show_final(finished())
 
     def _show_final(self, finished: FinishedRun) -> None:
@@ -144,6 +146,16 @@ class RerunViewer:
 
     def _final(self, name: str, what: object) -> None:
         self._stream.log(f"{FINAL}/{name}", cast("Any", what), static=True)
+
+    def _show_way(self) -> None:
+        """Show the way since it was shown last, by odometry and with the loops known by then."""
+        import rerun as rr
+
+        if len(self._way) > 1:
+            alone, corrected = np.stack(self._way, axis=1)
+            for name, strip, stroke in (("odometry", alone, ODOMETRY), ("path", corrected, OPTIMISED)):
+                self._stream.log(f"{LIVE}/{name}", rr.LineStrips3D([strip], colors=_rgb(stroke.color)))
+            self._way = self._way[-1:]
 
     def _show_camera(self, camera: Intrinsics) -> None:
         if camera == self._intrinsics:
