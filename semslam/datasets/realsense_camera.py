@@ -18,7 +18,7 @@ from semslam.types import Frame, Trajectory
 
 SILENCE_MS = 5000
 """Milliseconds without a frame after which a camera counts as gone."""
-END_MS = 500
+END_MS = 2000
 """The same of a recording, which ends without a word."""
 COEFFICIENTS = ("none", "brown_conrady", "modified_brown_conrady")
 """The SDK's names of distortion models whose coefficients are OpenCV's."""
