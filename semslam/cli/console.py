@@ -128,10 +128,20 @@ def profile_table(profile: "Profile") -> Table:
     from semslam.runs.profile import stage_rows
 
     table = narrow_table(f"Where {profile.wall_s:.1f} s went")
-    for heading in ("where", "stage", "calls", "total, s", "of the run", "median, ms", "p95, ms", "worst, ms"):
+    for heading in (
+        "where",
+        "stage",
+        "calls",
+        "total, s",
+        "of the run",
+        "median, ms",
+        "p95, ms",
+        "worst, ms",
+        "CPU, ms",
+    ):
         table.add_column(heading, justify="left" if heading in ("where", "stage") else "right")
     for row in stage_rows(profile):
-        times = (f"{value:.1f}" for value in (row.median_ms, row.p95_ms, row.worst_ms))
+        times = (f"{value:.1f}" for value in (row.median_ms, row.p95_ms, row.worst_ms, row.cpu_ms))
         table.add_row(row.where, row.stage, str(row.calls), f"{row.total_s:.2f}", _percent(row.share), *times)
     return table
 

@@ -36,4 +36,12 @@ class RunClock:
 
     def profile(self, wall_s: float, stopwatch: Stopwatch, latencies: Latencies) -> Profile:
         """The timed calls of the run, given its length in seconds."""
-        return Profile(self._start.process, self._wall, wall_s, stopwatch.spans, latencies.tracking, latencies.loops)
+        return Profile(
+            self._start.process,
+            self._wall,
+            wall_s,
+            stopwatch.spans,
+            latencies.tracking,
+            latencies.tracking_cpu,
+            latencies.loops,
+        )

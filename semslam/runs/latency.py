@@ -13,7 +13,9 @@ class Latencies:
 
     def __init__(self) -> None:
         self._begun = self._came = time.perf_counter()
+        self._cpu_begun = time.thread_time()
         self._tracking: list[tuple[float, float]] = []
+        self._cpu: list[float] = []
         self._lag: list[float] = []
         self._loops: list[tuple[float, float]] = []
         self._keyframes: dict[int, float] = {}
@@ -24,7 +26,7 @@ class Latencies:
         Args:
             came: when it came, in seconds of ``time.perf_counter``; None = now.
         """
-        self._begun = time.perf_counter()
+        self._begun, self._cpu_begun = time.perf_counter(), time.thread_time()
         self._came = self._begun if came is None else came
 
     def done(self, keyframe: int | None) -> None:
@@ -35,6 +37,7 @@ class Latencies:
         """
         now = time.perf_counter()
         self._tracking.append((self._begun, now - self._begun))
+        self._cpu.append(time.thread_time() - self._cpu_begun)
         self._lag.append(now - self._came)
         if keyframe is not None:
             self._keyframes[keyframe] = self._came
@@ -48,6 +51,11 @@ class Latencies:
     def tracking(self) -> tuple[tuple[float, float], ...]:
         """Start and length of each frame's tracking, in seconds."""
         return tuple(self._tracking)
+
+    @property
+    def tracking_cpu(self) -> tuple[float, ...]:
+        """Processor seconds of the thread, of each frame's tracking."""
+        return tuple(self._cpu)
 
     @property
     def loops(self) -> tuple[tuple[float, float], ...]:

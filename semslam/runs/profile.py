@@ -1,6 +1,7 @@
 """Where the time of a run went: per stage and thread, frame by frame, and from a keyframe to its loop's effect."""
 
 from collections import defaultdict
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -29,6 +30,7 @@ class Profile:
         wall_s: how long it took until the last adjustment was done.
         spans: each call of a stage.
         tracking: start and length of each frame's tracking.
+        tracking_cpu: processor seconds of the thread, of each frame's tracking.
         loops: start and length of the time from each keyframe to its loops' effect.
     """
 
@@ -37,6 +39,7 @@ class Profile:
     wall_s: float
     spans: tuple[Span, ...]
     tracking: tuple[tuple[float, float], ...]
+    tracking_cpu: tuple[float, ...]
     loops: tuple[tuple[float, float], ...]
 
 
@@ -53,6 +56,7 @@ class StageRow:
         median_ms: of a call.
         p95_ms: of a call.
         worst_ms: of a call.
+        cpu_ms: median processor time of the thread, of a call.
     """
 
     stage: str
@@ -63,14 +67,15 @@ class StageRow:
     median_ms: float
     p95_ms: float
     worst_ms: float
+    cpu_ms: float
 
 
 def stage_rows(profile: Profile) -> tuple[StageRow, ...]:
     """The stages by thread, the one that took longest first."""
-    calls: defaultdict[tuple[str, str], list[float]] = defaultdict(list)
+    calls: defaultdict[tuple[str, str], list[Span]] = defaultdict(list)
     for span in profile.spans:
-        calls[_where(span, profile.process), span.stage].append(span.seconds)
-    rows = [_row(stage, where, np.array(seconds), profile.wall_s) for (where, stage), seconds in calls.items()]
+        calls[_where(span, profile.process), span.stage].append(span)
+    rows = [_row(stage, where, spans, profile.wall_s) for (where, stage), spans in calls.items()]
     return tuple(sorted(rows, key=lambda row: (row.where, -row.total_s)))
 
 
@@ -84,10 +89,12 @@ def write_profile(directory: Path, profile: Profile) -> None:
 
     tracking = latency([seconds for _, seconds in profile.tracking], 1e3)
     loops = latency([seconds for _, seconds in profile.loops], 1.0)
+    cpu = latency(profile.tracking_cpu, 1e3)
     content = {
         "wall_s": round(profile.wall_s, 3),
         "stages": [asdict(row) for row in stage_rows(profile)],
         "tracking_ms": None if tracking is None else tracking.model_dump(),
+        "tracking_cpu_ms": None if cpu is None else cpu.model_dump(),
         "loop_s": None if loops is None else loops.model_dump(),
     }
     write_json(directory / PROFILE, content)
@@ -111,10 +118,11 @@ def _drawing(profile: Profile) -> "ProfileDrawing":
     )
 
 
-def _row(stage: str, where: str, seconds: "np.ndarray[tuple[int], np.dtype[np.float64]]", wall_s: float) -> StageRow:
+def _row(stage: str, where: str, spans: Sequence[Span], wall_s: float) -> StageRow:
+    seconds = np.array([span.seconds for span in spans])
     median, p95, worst = np.round(1e3 * np.quantile(seconds, [0.5, 0.95, 1.0]), 3).tolist()
-    total = float(seconds.sum())
-    return StageRow(stage, where, len(seconds), round(total, 4), round(total / wall_s, 4), median, p95, worst)
+    total, cpu_ms = float(seconds.sum()), round(1e3 * float(np.median([span.cpu for span in spans])), 3)
+    return StageRow(stage, where, len(spans), round(total, 4), round(total / wall_s, 4), median, p95, worst, cpu_ms)
 
 
 def _where(span: Span, process: int) -> str:

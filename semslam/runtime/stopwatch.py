@@ -18,6 +18,7 @@ class Span(NamedTuple):
         stage: its name.
         start: seconds of ``time.perf_counter``, which all processes of a machine share.
         seconds: how long it took.
+        cpu: processor seconds of the thread that did it, which a busy machine hardly changes.
         process: the process that did it.
         thread: the name of its thread.
     """
@@ -25,6 +26,7 @@ class Span(NamedTuple):
     stage: str
     start: float
     seconds: float
+    cpu: float
     process: int
     thread: str
 
@@ -43,12 +45,12 @@ class Stopwatch:
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:
         """Time the block as one call of ``name``."""
-        start = time.perf_counter()
+        start, cpu = time.perf_counter(), time.thread_time()
         try:
             yield
         finally:
-            seconds = time.perf_counter() - start
-            self._spans.append(Span(name, start, seconds, os.getpid(), threading.current_thread().name))
+            spent = time.perf_counter() - start, time.thread_time() - cpu
+            self._spans.append(Span(name, start, *spent, os.getpid(), threading.current_thread().name))
 
     def take(self) -> tuple[Span, ...]:
         """Hand out the calls so far, and start anew."""

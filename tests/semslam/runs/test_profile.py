@@ -14,12 +14,12 @@ from tests.conftest import Call
 
 OURS, OTHER = 10, 11
 SPANS = (
-    Span("odometry", 100.0, 0.25, OURS, "MainThread"),
-    Span("odometry", 101.0, 0.75, OURS, "MainThread"),
-    Span("read", 100.0, 0.5, OURS, "semslam-reader_0"),
-    Span("verify", 101.0, 1.0, OTHER, "MainThread"),
+    Span("odometry", 100.0, 0.25, 0.125, OURS, "MainThread"),
+    Span("odometry", 101.0, 0.75, 0.25, OURS, "MainThread"),
+    Span("read", 100.0, 0.5, 0.5, OURS, "semslam-reader_0"),
+    Span("verify", 101.0, 1.0, 1.0, OTHER, "MainThread"),
 )
-PROFILE = Profile(OURS, 100.0, 4.0, SPANS, ((100.0, 0.25), (101.0, 0.75)), ((100.0, 2.0),))
+PROFILE = Profile(OURS, 100.0, 4.0, SPANS, ((100.0, 0.25), (101.0, 0.75)), (0.125, 0.25), ((100.0, 2.0),))
 
 
 def test_stages_are_counted_by_thread_and_process() -> None:
@@ -27,7 +27,7 @@ def test_stages_are_counted_by_thread_and_process() -> None:
     assert set(rows) == {("main thread", "odometry"), ("reading thread", "read"), ("loop process", "verify")}
     odometry = rows["main thread", "odometry"]
     assert (odometry.calls, odometry.total_s, odometry.share) == (2, 1.0, 0.25)
-    assert (odometry.median_ms, odometry.worst_ms) == (500.0, 750.0)
+    assert (odometry.median_ms, odometry.worst_ms, odometry.cpu_ms) == (500.0, 750.0, 187.5)
 
 
 def test_a_stopwatch_hands_its_calls_to_another() -> None:
