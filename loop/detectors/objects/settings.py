@@ -20,7 +20,9 @@ class ObjectsConfig(Section):
     radius: float = setting(3.5, "maximum horizontal distance of the two cameras of a loop", unit="m", gt=0)
     tolerance: float = setting(0.3, "standard deviation of matched objects' distance", unit="m", gt=0)
     wall_tolerance: float = setting(0.12, "standard deviation of matched walls' distance", unit="m", gt=0)
-    use_labels: bool = setting(True, "compare classes; otherwise everything is of one class")
+    use_labels: bool = setting(
+        True, "compare classes in the match; objects are cut, and submaps shortlisted, by classes in any case"
+    )
     use_look: bool = setting(True, "compare how objects look")
     use_structure: bool = setting(True, "match walls too")
     min_score: float = setting(0.25, "share of matched objects and walls that makes a candidate", ge=0, le=1)
