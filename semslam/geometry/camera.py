@@ -60,7 +60,8 @@ class Intrinsics:
     depth_readout: float | None = None
 
     def __post_init__(self) -> None:
-        readout, depth_readout = self.readout or 0.0, self.depth_readout or 0.0
+        readout = 0.0 if self.readout is None else self.readout
+        depth_readout = 0.0 if self.depth_readout is None else self.depth_readout
         timing = (readout, self.delay, depth_readout)
         values = (self.width, self.height, self.fx, self.fy, self.cx, self.cy, *timing, *self.distortion)
         numeric = all(isinstance(value, int | float | np.number) for value in values)
