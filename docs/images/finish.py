@@ -14,19 +14,25 @@ CUT = 2.1
 
 
 def draw_mesh(file: Path) -> np.ndarray:
-    """The mesh from a corner above it, (H, W, 3) BGR; the run's world has y down and starts at the first camera."""
+    """The mesh from above, without the walls that would hide it, (H, W, 3) BGR.
+
+    The run's world has y down and starts at the first camera; Open3D's ``up`` points down in the image.
+    """
     mesh = o3d.io.read_triangle_mesh(str(file))
     points = np.asarray(mesh.vertices)
     floor = np.percentile(points[:, 1], 99)
     mesh.remove_vertices_by_mask(points[:, 1] < floor - CUT)
     points, colors, faces = (np.asarray(part) for part in (mesh.vertices, mesh.vertex_colors, mesh.triangles))
     low, high = points.min(axis=0), points.max(axis=0)
-    middle, reach = (low + high) / 2, float(np.linalg.norm(high - low))
+    middle = (low + high) / 2
+    eye = middle + np.linalg.norm(high - low) * np.array([0.0, -0.6, -0.85])
+    mesh.compute_triangle_normals()
+    towards = eye - points[faces].mean(axis=1)
+    mesh.remove_triangles_by_mask((np.asarray(mesh.triangle_normals) * towards).sum(axis=1) <= 0)
+    faces = np.asarray(mesh.triangles)
     scene = o3d.t.geometry.RaycastingScene()
     scene.add_triangles(o3d.t.geometry.TriangleMesh.from_legacy(mesh))
-    rays = scene.create_rays_pinhole(
-        FIELD_OF_VIEW, middle, middle + reach * np.array([-0.33, -1.25, -0.5]), [0, -1, 0], *SIZE
-    )
+    rays = scene.create_rays_pinhole(FIELD_OF_VIEW, middle, eye, [0, 1, 0], *SIZE)
     hit = scene.cast_rays(rays)
     seen = np.isfinite(hit["t_hit"].numpy())
     corners, (u, v) = faces[hit["primitive_ids"].numpy()[seen]], hit["primitive_uvs"].numpy()[seen].T
