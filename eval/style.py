@@ -105,8 +105,14 @@ INACCURATE = Look("inaccurate", "inaccurate loop", "#e69f00", (0, (4, 1.5)), "s"
 FALSE = Look("false", "false loop", "#d55e00", "-", "X")
 WITHDRAWN = Look("withdrawn", "withdrawn by the graph", "#56b4e9", "", "v")
 REJECTED = Look("rejected", "rejected by the verification", "#999999", "", "x")
-LOOKS = (TRUE, ACCEPTED, INACCURATE, FALSE, WITHDRAWN, REJECTED)
-OUTCOMES = {LoopOutcome.ACCEPTED: ACCEPTED, LoopOutcome.WITHDRAWN: WITHDRAWN, LoopOutcome.REJECTED: REJECTED}
+SKIPPED = Look("skipped", "not verified", "#bbbbbb", "", ".")
+LOOKS = (TRUE, ACCEPTED, INACCURATE, FALSE, WITHDRAWN, REJECTED, SKIPPED)
+OUTCOMES = {
+    LoopOutcome.ACCEPTED: ACCEPTED,
+    LoopOutcome.WITHDRAWN: WITHDRAWN,
+    LoopOutcome.REJECTED: REJECTED,
+    LoopOutcome.SKIPPED: SKIPPED,
+}
 """Looks where nothing is known of the truth."""
 _JUDGED = {
     LoopJudgement.TRUE: TRUE,

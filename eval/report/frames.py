@@ -7,14 +7,14 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from semslam.eval.style import ACCEPTED, FALSE, INACCURATE, REJECTED, TRUE, WITHDRAWN, look_of
+from semslam.eval.style import ACCEPTED, FALSE, INACCURATE, REJECTED, SKIPPED, TRUE, WITHDRAWN, look_of
 from semslam.types import LedgerEntry, UInt8Array
 
 BUDGET = 6_000_000
 """Bytes of a page's images, as they are embedded."""
 WIDTH, MASK_WIDTH = 320, 160
 JPEG_QUALITY = 70
-PRIORITY = (FALSE, INACCURATE, WITHDRAWN, TRUE, ACCEPTED, REJECTED)
+PRIORITY = (FALSE, INACCURATE, WITHDRAWN, TRUE, ACCEPTED, REJECTED, SKIPPED)
 """Whose images come first where not all of them fit."""
 
 

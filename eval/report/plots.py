@@ -9,7 +9,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from semslam.eval.report.drawing import AXES, RunDrawing, aligned, broken, error_curves, loop_ends, paths, plane
-from semslam.eval.style import FALSE, PLAIN, REJECTED, PictureSettings, by_look, legend_below, render
+from semslam.eval.style import FALSE, PLAIN, REJECTED, SKIPPED, PictureSettings, by_look, legend_below, render
 from semslam.geometry.se3 import FloatArray
 from semslam.types import Trajectory
 
@@ -120,9 +120,10 @@ def draw_timeline(figure: Figure, run: RunDrawing) -> None:
     groups = by_look(run.loops)
     for look, loops in reversed(groups.items()):
         x, y = np.array([(loop.query_time, loop.match_time) for loop in loops]).T - run.start
+        faint = look in (REJECTED, SKIPPED)
         axes.scatter(
-            x, y, s=11 if look is REJECTED else 26, marker=look.marker, color=look.color,
-            alpha=0.7 if look is REJECTED else 0.85, linewidths=0.9 if look is REJECTED else 0,
+            x, y, s=11 if faint else 26, marker=look.marker, color=look.color,
+            alpha=0.7 if faint else 0.85, linewidths=0.9 if look is REJECTED else 0,
             label=f"{look.label} ({len(loops)})",
         )  # fmt: skip
     if not run.loops:

@@ -25,7 +25,7 @@ RunFolder = Annotated[Path, typer.Argument(help="A run folder.")]
 
 def ledger_command(
     run: RunFolder,
-    verdict: Annotated[str | None, typer.Option(help="Only accepted, rejected or withdrawn ones.")] = None,
+    verdict: Annotated[str | None, typer.Option(help="Only accepted, withdrawn, rejected or skipped ones.")] = None,
     reason: Annotated[str | None, typer.Option(help="Only those that failed this test.")] = None,
     truth: Annotated[str | None, typer.Option(help="Only true, inaccurate or false ones.")] = None,
     as_json: options.Json = False,

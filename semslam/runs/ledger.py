@@ -19,10 +19,10 @@ from semslam.types import (
 
 
 def rejected_entry(rejection: LoopRejection, keyframes: Sequence[Keyframe]) -> LedgerEntry:
-    """The entry of a candidate that the verification refused."""
+    """The entry of a candidate that the verification refused or was not asked about."""
     return LedgerEntry(
         **_identity(rejection, keyframes),
-        verdict=LoopOutcome.REJECTED,
+        verdict=LoopOutcome.SKIPPED if rejection.reason.is_unverified else LoopOutcome.REJECTED,
         reason=rejection.reason.value,
         figure=rejection.figure,
         limit=rejection.limit,

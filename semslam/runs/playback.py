@@ -36,8 +36,9 @@ def play(saved: SavedViews, viewer: Viewer, progress: Progress = silent) -> None
     segmenter = build_segmenter(saved.run.config)
     loops = defaultdict(list)
     for entry in saved.run.ledger:
-        verified = entry.verdict is not LoopOutcome.REJECTED
-        loops[entry.query].append(ShownLoop(entry.query, entry.match, verified))
+        if entry.verdict is not LoopOutcome.SKIPPED:
+            verified = entry.verdict is not LoopOutcome.REJECTED
+            loops[entry.query].append(ShownLoop(entry.query, entry.match, verified))
     live = _live_poses(saved.run.directory)
     keyframes: list[Keyframe] = []
     for done, recorded in enumerate(saved.recording.frames, start=1):

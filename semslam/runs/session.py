@@ -128,7 +128,9 @@ class Session:
         if self._journal is not None:
             self._journal.outcomes(answer.verifications)
         loops = tuple(
-            ShownLoop(v.candidate.query, v.candidate.match, isinstance(v, LoopConstraint)) for v in answer.verifications
+            ShownLoop(v.candidate.query, v.candidate.match, isinstance(v, LoopConstraint))
+            for v in answer.verifications
+            if isinstance(v, LoopConstraint) or not v.reason.is_unverified
         )
         self._viewer.loops(LoopScene(self._slam.keyframes[answer.keyframe], answer.labels, loops))
 

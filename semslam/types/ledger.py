@@ -27,10 +27,11 @@ class JudgedLoop:
 
 
 class LoopOutcome(StrEnum):
-    """What became of a candidate: not verified, or verified and then followed by the graph or not."""
+    """What became of a candidate: not looked at, refused by the verification, or verified and followed by the graph or not."""
 
     ACCEPTED = "accepted"
     REJECTED = "rejected"
+    SKIPPED = "skipped"
     WITHDRAWN = "withdrawn"
 
 
@@ -65,7 +66,7 @@ class LedgerEntry:
         detector: who proposed it.
         score: the detector's score, 0..1.
         evidence: what agreed.
-        verdict: rejected by the verification, withdrawn by the graph, or accepted.
+        verdict: skipped before the verification, rejected by it, withdrawn by the graph, or accepted.
         reason: the test that failed, or None.
         figure: the value that failed, or None.
         limit: the value it should have met, or None.

@@ -164,6 +164,11 @@ class RejectionReason(StrEnum):
     OUTLIER = "outlier"
     SHED = "shed"
 
+    @property
+    def is_unverified(self) -> bool:
+        """Whether the verification was not asked."""
+        return self in (RejectionReason.REDUNDANT, RejectionReason.SHED)
+
 
 @dataclass(frozen=True, slots=True)
 class LoopRejection:

@@ -12,7 +12,7 @@ const COLUMNS = [
   {title: "error", value: (loop) => loop.error, text: (loop) => (loop.error === null ? "" : `${loop.error.toFixed(1)} cm`)},
 ];
 const NODE_COLORS = ["#009e73", "#e69f00", "#56b4e9", "#f0e442", "#d55e00", "#cc79a7"];
-const SYMBOLS = {true: "circle", accepted: "circle", inaccurate: "square", false: "x", withdrawn: "triangle-down", rejected: "x-thin-open"};
+const SYMBOLS = {true: "circle", accepted: "circle", inaccurate: "square", false: "x", withdrawn: "triangle-down", rejected: "x-thin-open", skipped: "circle-open"};
 const $ = (id) => document.getElementById(id);
 const table = {order: 0, ascending: true, shown: PAGE, rows: []};
 
@@ -221,7 +221,7 @@ function drawTimeline() {
       customdata: shown.map(({index}) => index),
       text: shown.map(({loop}) => `${loop.query} → ${loop.match}${loop.reason ? `<br>${loop.reason}` : ""}`),
       mode: "markers",
-      marker: {color: kind.color, size: kind.name === "rejected" ? 5 : 7, symbol: SYMBOLS[kind.name], opacity: 0.8},
+      marker: {color: kind.color, size: ["rejected", "skipped"].includes(kind.name) ? 5 : 7, symbol: SYMBOLS[kind.name], opacity: 0.8},
       hovertemplate: `%{text}<extra>${kind.label}</extra>`,
     };
   });

@@ -27,4 +27,5 @@ def judged(judgement: LoopJudgement) -> LedgerEntry:
     return replace(ACCEPTED, truth=JudgedLoop(judgement, 0.03, 0.4))
 
 
-ALL_KINDS = (*map(judged, LoopJudgement), ACCEPTED, WITHDRAWN, REJECTED)
+SKIPPED = replace(REJECTED, verdict=LoopOutcome.SKIPPED, reason="redundant", figure=4, limit=4)
+ALL_KINDS = (*map(judged, LoopJudgement), ACCEPTED, WITHDRAWN, REJECTED, SKIPPED)

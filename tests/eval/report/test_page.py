@@ -76,11 +76,12 @@ def test_what_is_due_to_loops_and_to_the_adjustment_stands_apart() -> None:
 def test_every_candidate_is_there_with_all_its_values() -> None:
     data = json.loads(parsed(make_report(REPORT)).data)
     assert [kind["name"] for kind in data["kinds"]] == [
-        "true", "accepted", "inaccurate", "false", "withdrawn", "rejected",
+        "true", "accepted", "inaccurate", "false", "withdrawn", "rejected", "skipped",
     ]  # fmt: skip
     assert len(data["candidates"]) == len(ALL_KINDS)
-    rejected, withdrawn, true = data["candidates"][-1], data["candidates"][-2], data["candidates"][0]
+    true, (withdrawn, rejected, skipped) = data["candidates"][0], data["candidates"][-3:]
     assert rejected["reason"] == "few inliers: 12, limit 20"
+    assert skipped["reason"] == "repeats loops of neighbouring keyframes: 4, limit 4"
     assert withdrawn["reason"] == "outlier in the graph: 9.1, limit 4.7"
     groups = {title: dict(values) for title, values in true["groups"]}
     assert groups["Proposal"]["rotation"] == "1.25"
