@@ -27,7 +27,7 @@ class JudgedLoop:
 
 
 class LoopOutcome(StrEnum):
-    """What became of a candidate: not looked at, refused by the verification, or verified and followed by the graph or not."""
+    """What became of a candidate: skipped, rejected by the verification, or verified and then in the graph or not."""
 
     ACCEPTED = "accepted"
     REJECTED = "rejected"
