@@ -3,21 +3,18 @@
     python benchmarks/drift.py run SEQUENCE... --folder DIR --jobs 2 --starts 0,2,4,6,8
     python benchmarks/drift.py table DIR
     python benchmarks/drift.py list DIR
-    python benchmarks/drift.py covariances SEQUENCE... --folder DIR
 
 Each odometry tracks a sequence once per start (those of ``--once`` at the first start alone); its recording is kept in
 DIR and replayed with each detector. Every replay adds a line to DIR/rows.csv, and what stands there is not done again:
 a run that was stopped goes on where it was. After a change of verification or back end delete rows.csv, after one of an
 odometry its recordings. With ``--runs`` each replay also leaves a run folder.
 
-A process takes one start of a sequence, on one thread. Odometries and detectors share its segmentations and what
-became of each pair of frames: the verification looks at the frames alone, not at where odometry puts them.
+A process takes one start of a sequence, on one thread. Odometries and detectors share its segmentations, and what
+became of a pair of frames that was verified with the same matched nodes and the same predicted pose.
 
 The table, in Markdown, gives the median and the range over the starts of the ATE (SE(3), all frames) in centimetres,
 each detector's change against no loops on the same recording, and which part it removes of what lies above the best
 front end of the sequence. The list, for many detectors, has a line for each of them.
-``covariances`` compares what each recorded odometry states with the truth, over a keyframe's distance: the normalised
-squared error divided by its six degrees of freedom, 1 where a covariance is right.
 """
 
 import argparse
@@ -34,24 +31,20 @@ from typing import TypeVar
 
 import numpy as np
 
-from semslam import plugins
 from semslam.config import Config
 from semslam.datasets import Dataset, open_dataset
 from semslam.datasets.selection import Selection
-from semslam.eval.nees import DEGREES_OF_FREEDOM, nees
-from semslam.eval.trajectory import poses_at
-from semslam.geometry.se3 import adjoint, invert
 from semslam.loop.verification.icp import IcpVerifier
 from semslam.runs.metrics import Metrics
 from semslam.runs.pipeline import replay, run
-from semslam.runs.recording import Recording, read_recording, write_recording
+from semslam.runs.recording import read_recording, write_recording
 from semslam.runs.results import write_run
-from semslam.types import FloatArray, Frame, Keyframe, LoopCandidate, LoopConstraint, LoopRejection, TrackingStatus
+from semslam.types import Frame, Keyframe, LoopCandidate, LoopConstraint, LoopRejection
 
 ROWS = "rows.csv"
 ALONE = "none"
 KEY = ("sequence", "odometry", "start", "detector")
-FIGURES = ("alone_m", "ate_m", "tracked", "accepted", "true", "inaccurate", "false")
+VALUES = ("alone_m", "ate_m", "tracked", "accepted", "true", "inaccurate", "false")
 Row = dict[str, str]
 NameT = TypeVar("NameT", bound=Hashable)
 
@@ -193,7 +186,7 @@ def read_rows(path: Path) -> list[Row]:
 def add_row(path: Path, row: Row, spent: float) -> None:
     fresh = not path.exists()
     with path.open("a", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, [*KEY, *FIGURES])
+        writer = csv.DictWriter(file, [*KEY, *VALUES])
         if fresh:
             writer.writeheader()
         writer.writerow(row)
@@ -225,40 +218,6 @@ def print_list(arguments: argparse.Namespace) -> None:
         print(f"| {' | '.join([sequence, odometry, detector, *cells])} |")
 
 
-def print_covariances(arguments: argparse.Namespace) -> None:
-    print("| sequence | odometry | starts | squared error, 50 / 90 / 99 % |\n|---|---|---|---|")
-    for sequence in arguments.sequences:
-        dataset = open_dataset(sequence)
-        for odometry in plugins.names("semslam.odometry"):
-            kept = sorted(arguments.folder.glob(f"{dataset.name}-{odometry}-[0-9]"))
-            errors = np.concatenate([normalised_errors(read_recording(path), dataset) for path in kept] or [[]])
-            if len(errors):
-                spread = " / ".join(f"{value:.2f}" for value in np.percentile(errors, [50, 90, 99]))
-                print(f"| {dataset.name} | {odometry} | {len(kept)} | {spread} |", flush=True)
-
-
-def normalised_errors(recording: Recording, dataset: Dataset) -> FloatArray:
-    """Squared errors (N,) of the stated motion over stretches of a keyframe's distance that were tracked throughout."""
-    assert dataset.ground_truth is not None, f"{dataset.name} has no ground truth."
-    frames = recording.frames
-    stamps = [frame.timestamp for frame in frames]
-    truth, known = poses_at(dataset.ground_truth, stamps)
-    stride = max(round(Config().keyframes.interval / float(np.median(np.diff(stamps)))), 1)
-    errors, covariances = [], []
-    for first in range(0, len(frames) - stride, stride):
-        last, T, covariance = first + stride, np.eye(4), np.zeros((6, 6))
-        motions = [frame.motion for frame in frames[first + 1 : last + 1]]
-        if not (known[first] and known[last]) or any(motion.status is TrackingStatus.LOST for motion in motions):
-            continue
-        for motion in motions:
-            Ad = adjoint(invert(motion.T_prev_cur))
-            covariance = Ad @ covariance @ Ad.T + motion.covariance
-            T = T @ motion.T_prev_cur
-        errors.append(invert(invert(truth[first]) @ truth[last]) @ T)
-        covariances.append(covariance)
-    return nees(np.array(errors).reshape(-1, 4, 4), np.array(covariances).reshape(-1, 6, 6)) / DEGREES_OF_FREEDOM
-
-
 def line(rows: Sequence[Row], sequence: str, odometry: str, detectors: Sequence[str], best: float) -> str:
     alone = errors(rows, odometry, ALONE)
     causal = errors(rows, odometry, ALONE, "alone_m")
@@ -284,7 +243,7 @@ def listed(names: str) -> list[str]:
 
 
 def errors(rows: Iterable[Row], odometry: str, detector: str, column: str = "ate_m") -> dict[str, float]:
-    """A figure by start."""
+    """A value by start."""
     chosen = [row for row in rows if (row["odometry"], row["detector"]) == (odometry, detector)]
     return {row["start"]: float(row[column]) for row in chosen if row[column] != "None"}
 
@@ -319,10 +278,6 @@ def main() -> None:
     printing = commands.add_parser("table")
     printing.set_defaults(work=print_table)
     printing.add_argument("folder", type=Path)
-    judging = commands.add_parser("covariances")
-    judging.set_defaults(work=print_covariances)
-    judging.add_argument("sequences", nargs="+")
-    judging.add_argument("--folder", type=Path, required=True)
     listing = commands.add_parser("list")
     listing.set_defaults(work=print_list)
     listing.add_argument("folder", type=Path)
