@@ -97,8 +97,8 @@ class LoopSearch:
             labels: its segmentation, where there is one already.
 
         Returns:
-            What became of each candidate, in order; those that would repeat loops of neighbouring keyframes are refused
-            without verification.
+            What became of each candidate, in order; those that would repeat loops of neighbouring keyframes are not
+            verified.
         """
         view = self._view(keyframe, frame, labels)
         self._labels = view.labels

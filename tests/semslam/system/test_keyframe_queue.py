@@ -13,7 +13,7 @@ from semslam.types import LoopCandidate, LoopRejection, RejectionReason
 
 
 class SlowWorker(Worker):
-    """Answers when it is told to; an answer is the job's keyframe and how many waited behind it."""
+    """Answers when it is asked to; an answer is the job's keyframe and how many waited behind it."""
 
     def __init__(self) -> None:
         self.jobs: list[tuple[Future, tuple[int, int]]] = []
