@@ -104,3 +104,19 @@ def write_whole(path: Path, data: bytes, error: type[SemslamError]) -> None:
             partial.unlink()
         text = (reason.strerror or str(reason)) if isinstance(reason, OSError) else "its name is not usable"
         raise error(f"{path} cannot be written: {text}.") from reason
+
+
+def cache_arrays(path: Path, **arrays: npt.NDArray[Any]) -> None:
+    """Write an npz file of a cache, whole or not at all; the folder is made.
+
+    A cache that cannot be written, as on a full disk, costs time and no result, so that nothing is raised.
+    """
+    temporary = path.with_name(f"{path.name}.{os.getpid()}.part")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with temporary.open("wb") as file:
+            np.savez_compressed(file, **arrays)  # type: ignore[arg-type]
+        temporary.replace(path)
+    except OSError:
+        with contextlib.suppress(OSError):
+            temporary.unlink()

@@ -22,6 +22,9 @@ class DatasetConfig(Section):
     color_topic: str | None = setting(None, "ROS bag: topic of the colour images; none = chosen by role")
     depth_topic: str | None = setting(None, "ROS bag: topic of the depth images; none = chosen by role")
     camera_topic: str | None = setting(None, "ROS bag: topic of the CameraInfo; none = that of the colour images")
+    cache_dir: Path | None = setting(
+        None, "folder that stores the frames of rendered scenes once they are made; none = made whenever they are read"
+    )
     start: int = setting(0, "frames skipped at the beginning", ge=0)
     max_frames: int | None = setting(None, "maximum number of frames", gt=0)
     stride: int = setting(1, "read every n-th frame", gt=0)

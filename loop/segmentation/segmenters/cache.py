@@ -1,7 +1,6 @@
 """Caches segmentations on disk, so that a sweep does not segment an image twice."""
 
 import hashlib
-import os
 from pathlib import Path
 from typing import Self
 
@@ -9,7 +8,7 @@ import numpy as np
 
 from semslam.config import Config
 from semslam.errors import ConfigError, ModelError
-from semslam.files import read_arrays
+from semslam.files import cache_arrays, read_arrays
 from semslam.loop.segmentation.photos import UInt8Array
 from semslam.loop.segmentation.segmenter import Segmenter
 from semslam.plugins import load
@@ -60,7 +59,7 @@ class CachedSegmenter:
             answer = self._inner.segment(color, frame_index)
             steps = None if answer.confidence is None else np.round(answer.confidence * 255).astype(np.uint8)
             kept = (answer.labels, steps)
-            _write(path, *kept)
+            cache_arrays(path, labels=answer.labels, **({} if steps is None else {"confidence": steps}))
         labels, steps = kept
         return LabelMap(labels, self.names, None if steps is None else steps.astype(np.float32) / np.float32(255))
 
@@ -77,12 +76,3 @@ class CachedSegmenter:
         if labels is None or any(array.dtype != np.uint8 or array.shape != size for array in kept):
             return None
         return (labels, steps) if labels.max(initial=0) < len(self.names) else None
-
-
-def _write(path: Path, labels: UInt8Array, confidence: UInt8Array | None) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    extra = {} if confidence is None else {"confidence": confidence}
-    temporary = path.with_name(f"{path.name}.{os.getpid()}.part")
-    with temporary.open("wb") as file:
-        np.savez_compressed(file, labels=labels, **extra)  # type: ignore[arg-type]
-    temporary.replace(path)

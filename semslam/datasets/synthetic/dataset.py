@@ -12,6 +12,7 @@ import numpy.typing as npt
 from pydantic import Field, ValidationError, field_validator
 
 from semslam.config import DatasetConfig, Section
+from semslam.datasets.synthetic.cache import FrameCache
 from semslam.datasets.synthetic.path import Walk, Way
 from semslam.datasets.synthetic.renderer import Lighting, Renderer, View
 from semslam.datasets.synthetic.scenes import PLANS
@@ -89,6 +90,7 @@ class SyntheticDataset:
     Args:
         scene: "house" (four rooms and a corridor), "twins" (two rooms that look alike) or "room".
         request: switches.
+        cache: folder that stores frames once they are rendered; None = rendered whenever they are read.
 
     Raises:
         DatasetError: the scene is unknown.
@@ -97,12 +99,14 @@ class SyntheticDataset:
     layout: ClassVar[str] = "synthetic:SCENE"
     reads: ClassVar[tuple[str, ...]] = ()
 
-    def __init__(self, scene: str, request: Request) -> None:
+    def __init__(self, scene: str, request: Request, cache: Path | None = None) -> None:
         if scene not in PLANS:
             raise DatasetError(f"There is no synthetic scene '{scene}'. Known: {', '.join(PLANS)}.")
         self._scene = scene
         self._request = request
         self.name = f"synthetic-{scene}"
+        switches = request.model_copy(update={"frames": 0}).model_dump_json()  # fewer frames are the same frames
+        self._cache = None if cache is None else FrameCache(cache, scene, switches)
 
     @classmethod
     def recognises(cls, path: Path) -> bool:
@@ -117,7 +121,7 @@ class SyntheticDataset:
             DatasetError: the scene or a switch is unknown, or a value out of its range.
         """
         scene, _, query = str(path).partition(":")[2].partition("?")
-        return cls(scene or "house", Request.parse(query))
+        return cls(scene or "house", Request.parse(query), config.cache_dir)
 
     @property
     def intrinsics(self) -> Intrinsics:
@@ -154,11 +158,20 @@ class SyntheticDataset:
         return (self.frame(index) for index in range(len(self)))
 
     def frame(self, index: int) -> Frame:
-        """Render one frame as the sensor sees it.
+        """A frame as the sensor sees it: rendered, or read from the cache.
 
         Raises:
             IndexError: there is no such frame.
         """
+        if self._cache is None or not 0 <= index < len(self):
+            return self._rendered(index)
+        frame = self._cache.read(index, self.timestamps[index], self.intrinsics)
+        if frame is None:
+            frame = self._rendered(index)
+            self._cache.write(frame)
+        return frame
+
+    def _rendered(self, index: int) -> Frame:
         view = self.view(index)
         if self._request.noise:
             rng = np.random.default_rng([self._request.seed, 2, index])
