@@ -10,12 +10,12 @@ from matplotlib.figure import Figure
 from semslam.eval.style import PLAIN, SERIES, PictureSettings, render
 from semslam.types import FloatArray
 
-Calls = tuple[tuple[float, float], ...]
-"""Start and length of each call, in seconds since the run began."""
+Calls = FloatArray
+"""Start and length (N, 2) of each call, in seconds since the run began."""
 BINS = 120
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class ProfileDrawing:
     """What is drawn.
 
@@ -44,9 +44,7 @@ def draw_profile(profile: ProfileDrawing, settings: PictureSettings = PLAIN) -> 
 
 def busy_share(calls: Calls, edges: FloatArray) -> FloatArray:
     """Share (N,) of each interval between edges (N + 1,) that calls take."""
-    if not calls:
-        return np.zeros(len(edges) - 1)
-    starts, seconds = np.array(calls).T
+    starts, seconds = calls.T
     done = np.clip(edges[:, None] - starts, 0.0, seconds).sum(axis=1)
     return np.asarray(np.diff(done) / np.diff(edges))
 
@@ -67,8 +65,8 @@ def _draw(figure: Figure, profile: ProfileDrawing, rows: int) -> None:
 
 
 def _draw_times(axes: Axes, calls: Calls, unit: float, title: str, name: str) -> None:
-    if calls:
-        starts, seconds = np.array(calls).T
+    if len(calls):
+        starts, seconds = calls.T
         axes.plot(starts, unit * seconds, ".", ms=3, color=SERIES[0].color)
     axes.set(ylabel=name, title=title)
     axes.set_ylim(bottom=0.0)

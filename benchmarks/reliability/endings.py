@@ -129,7 +129,7 @@ def _other_images(bench: Bench) -> str:
     out, other = killed(bench, tracking), bench.copy()
     first, second = sorted((other / "rgb").iterdir())[1:3]
     second.write_bytes(first.read_bytes())
-    done = bench.semslam("run", "--resume", out, other).expect(2, "does not come out again")
+    done = bench.semslam("run", "--resume", out, other).expect(2, "differs from the journal")
     if not journal_of(out).exists():
         raise UnexpectedOutcomeError("The journal is gone.")
     return f"exit code 2: {done.sentence} The journal stays, and with the right images the run is {resumed(bench, out)}"

@@ -40,7 +40,7 @@ class RunClock:
             self._start.process,
             self._wall,
             wall_s,
-            stopwatch.spans,
+            stopwatch.calls,
             latencies.tracking,
             latencies.tracking_cpu,
             latencies.loops,

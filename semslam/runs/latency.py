@@ -1,11 +1,13 @@
 """Latency of frames and loops: from arrival to effect."""
 
 import time
-from collections.abc import Sequence
+from array import array
 
 import numpy as np
+import numpy.typing as npt
 
 from semslam.runs.metrics import Latency
+from semslam.types import FloatArray
 
 
 class Latencies:
@@ -14,10 +16,8 @@ class Latencies:
     def __init__(self) -> None:
         self._begun = self._came = time.perf_counter()
         self._cpu_begun = time.thread_time()
-        self._tracking: list[tuple[float, float]] = []
-        self._cpu: list[float] = []
-        self._lag: list[float] = []
-        self._loops: list[tuple[float, float]] = []
+        # Plain numbers, since there are as many as frames.
+        self._tracking, self._cpu, self._lag, self._loops = array("d"), array("d"), array("d"), array("d")
         self._keyframes: dict[int, float] = {}
 
     def begin(self, came: float | None = None) -> None:
@@ -36,7 +36,7 @@ class Latencies:
             keyframe: the keyframe that it has become, if any.
         """
         now = time.perf_counter()
-        self._tracking.append((self._begun, now - self._begun))
+        self._tracking.extend((self._begun, now - self._begun))
         self._cpu.append(time.thread_time() - self._cpu_begun)
         self._lag.append(now - self._came)
         if keyframe is not None:
@@ -45,27 +45,27 @@ class Latencies:
     def loop(self, keyframe: int) -> None:
         """Note that loops of a keyframe move the live poses from now on."""
         came = self._keyframes.get(keyframe, self._came)
-        self._loops.append((came, time.perf_counter() - came))
+        self._loops.extend((came, time.perf_counter() - came))
 
     @property
-    def tracking(self) -> tuple[tuple[float, float], ...]:
-        """Start and length of each frame's tracking, in seconds."""
-        return tuple(self._tracking)
+    def tracking(self) -> FloatArray:
+        """Start and length (N, 2) of each frame's tracking, in seconds."""
+        return np.array(self._tracking).reshape(-1, 2)
 
     @property
-    def tracking_cpu(self) -> tuple[float, ...]:
-        """Processor seconds of the thread, of each frame's tracking."""
-        return tuple(self._cpu)
+    def tracking_cpu(self) -> FloatArray:
+        """Processor seconds (N,) of the thread, of each frame's tracking."""
+        return np.array(self._cpu)
 
     @property
-    def loops(self) -> tuple[tuple[float, float], ...]:
-        """Start and length of the time from a keyframe to the effect of its loops, in seconds."""
-        return tuple(self._loops)
+    def loops(self) -> FloatArray:
+        """Start and length (N, 2) of the time from a keyframe to the effect of its loops, in seconds."""
+        return np.array(self._loops).reshape(-1, 2)
 
     @property
     def tracking_ms(self) -> Latency | None:
         """Milliseconds that tracking took for a frame."""
-        return latency([seconds for _, seconds in self._tracking], 1e3)
+        return latency(self.tracking[:, 1], 1e3)
 
     @property
     def lag_ms(self) -> Latency | None:
@@ -75,12 +75,12 @@ class Latencies:
     @property
     def loop_s(self) -> Latency | None:
         """Seconds from a keyframe's arrival to the effect of its loops."""
-        return latency([seconds for _, seconds in self._loops], 1.0)
+        return latency(self.loops[:, 1], 1.0)
 
 
-def latency(seconds: Sequence[float], unit: float) -> Latency | None:
-    """Quantiles of times in seconds, times ``unit`` (1000 = milliseconds); None where there are no times."""
-    if not seconds:
+def latency(seconds: npt.ArrayLike, unit: float) -> Latency | None:
+    """Quantiles of times (N,) in seconds, times ``unit`` (1000 = milliseconds); None where there are no times."""
+    if not np.size(seconds):
         return None
-    median, p95, p99, worst = np.round(unit * np.quantile(seconds, [0.5, 0.95, 0.99, 1.0]), 4).tolist()
+    median, p95, p99, worst = np.round(unit * np.quantile(np.asarray(seconds), [0.5, 0.95, 0.99, 1.0]), 4).tolist()
     return Latency(median=median, p95=p95, p99=p99, worst=worst)

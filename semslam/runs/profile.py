@@ -1,7 +1,6 @@
 """Where the time of a run went: per stage and thread, frame by frame, and from a keyframe to its loop's effect."""
 
 from collections import defaultdict
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,7 +9,8 @@ import numpy as np
 
 from semslam.runs.files import write_json, writing
 from semslam.runs.latency import latency
-from semslam.runtime.stopwatch import Span
+from semslam.runtime.stopwatch import Calls
+from semslam.types import FloatArray
 
 PROFILE, PICTURE = "profile.json", "profile.png"
 if TYPE_CHECKING:
@@ -28,19 +28,19 @@ class Profile:
         process: the run's own; loops may be closed in another one.
         start: when it began, of ``time.perf_counter``.
         wall_s: how long it took until the last adjustment was done.
-        spans: each call of a stage.
-        tracking: start and length of each frame's tracking.
-        tracking_cpu: processor seconds of the thread, of each frame's tracking.
-        loops: start and length of the time from each keyframe to its loops' effect.
+        calls: of each stage in each thread.
+        tracking: start and length (N, 2) of each frame's tracking.
+        tracking_cpu: processor seconds (N,) of the thread, of each frame's tracking.
+        loops: start and length (K, 2) of the time from each keyframe to its loops' effect.
     """
 
     process: int
     start: float
     wall_s: float
-    spans: tuple[Span, ...]
-    tracking: tuple[tuple[float, float], ...]
-    tracking_cpu: tuple[float, ...]
-    loops: tuple[tuple[float, float], ...]
+    calls: tuple[Calls, ...]
+    tracking: FloatArray
+    tracking_cpu: FloatArray
+    loops: FloatArray
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,10 +72,10 @@ class StageRow:
 
 def stage_rows(profile: Profile) -> tuple[StageRow, ...]:
     """The stages by thread, the one that took longest first."""
-    calls: defaultdict[tuple[str, str], list[Span]] = defaultdict(list)
-    for span in profile.spans:
-        calls[_where(span, profile.process), span.stage].append(span)
-    rows = [_row(stage, where, spans, profile.wall_s) for (where, stage), spans in calls.items()]
+    times = _times_by_place(profile)
+    rows = [
+        _row(stage, where, some, profile.wall_s) for where, stages in times.items() for stage, some in stages.items()
+    ]
     return tuple(sorted(rows, key=lambda row: (row.where, -row.total_s)))
 
 
@@ -87,8 +87,8 @@ def write_profile(directory: Path, profile: Profile) -> None:
     """
     from semslam.eval.profile import draw_profile  # a run without pictures does without matplotlib
 
-    tracking = latency([seconds for _, seconds in profile.tracking], 1e3)
-    loops = latency([seconds for _, seconds in profile.loops], 1.0)
+    tracking = latency(profile.tracking[:, 1], 1e3)
+    loops = latency(profile.loops[:, 1], 1.0)
     cpu = latency(profile.tracking_cpu, 1e3)
     content = {
         "wall_s": round(profile.wall_s, 3),
@@ -107,30 +107,40 @@ def write_profile(directory: Path, profile: Profile) -> None:
 def _drawing(profile: Profile) -> "ProfileDrawing":
     from semslam.eval.profile import ProfileDrawing
 
-    busy: defaultdict[str, defaultdict[str, list[tuple[float, float]]]] = defaultdict(lambda: defaultdict(list))
-    for span in profile.spans:
-        busy[_where(span, profile.process)][span.stage].append((span.start - profile.start, span.seconds))
+    since = np.array([profile.start, 0.0])
+    times = _times_by_place(profile)
     return ProfileDrawing(
         wall_s=profile.wall_s,
-        busy={where: {stage: tuple(calls) for stage, calls in sorted(busy[where].items())} for where in sorted(busy)},
-        tracking=tuple((start - profile.start, seconds) for start, seconds in profile.tracking),
-        loops=tuple((start - profile.start, seconds) for start, seconds in profile.loops),
+        busy={
+            where: {stage: some[:, :2] - since for stage, some in sorted(times[where].items())}
+            for where in sorted(times)
+        },
+        tracking=profile.tracking - since,
+        loops=profile.loops - since,
     )
 
 
-def _row(stage: str, where: str, spans: Sequence[Span], wall_s: float) -> StageRow:
-    seconds = np.array([span.seconds for span in spans])
+def _times_by_place(profile: Profile) -> dict[str, dict[str, FloatArray]]:
+    """The times (N, 3) of all calls by thread or process and stage; see ``Calls``."""
+    found: defaultdict[str, defaultdict[str, list[FloatArray]]] = defaultdict(lambda: defaultdict(list))
+    for calls in profile.calls:
+        found[_where(calls, profile.process)][calls.stage].append(calls.times)
+    return {where: {stage: np.concatenate(some) for stage, some in stages.items()} for where, stages in found.items()}
+
+
+def _row(stage: str, where: str, times: FloatArray, wall_s: float) -> StageRow:
+    _, seconds, cpu = times.T
     median, p95, worst = np.round(1e3 * np.quantile(seconds, [0.5, 0.95, 1.0]), 3).tolist()
-    total, cpu_ms = float(seconds.sum()), round(1e3 * float(np.median([span.cpu for span in spans])), 3)
-    return StageRow(stage, where, len(spans), round(total, 4), round(total / wall_s, 4), median, p95, worst, cpu_ms)
+    total, cpu_ms = float(seconds.sum()), round(1e3 * float(np.median(cpu)), 3)
+    return StageRow(stage, where, len(times), round(total, 4), round(total / wall_s, 4), median, p95, worst, cpu_ms)
 
 
-def _where(span: Span, process: int) -> str:
+def _where(calls: Calls, process: int) -> str:
     """The thread or process that a call was made in, as people know it."""
-    if span.process != process:
+    if calls.process != process:
         return "loop process"
-    if span.thread.startswith(READING):
+    if calls.thread.startswith(READING):
         return "reading thread"
-    if span.thread.startswith(LOOPS):
+    if calls.thread.startswith(LOOPS):
         return "loop thread"
-    return "main thread" if span.thread == MAIN else span.thread
+    return "main thread" if calls.thread == MAIN else calls.thread

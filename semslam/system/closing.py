@@ -11,7 +11,7 @@ from semslam.frontend.keyframes import DetailExtractor
 from semslam.loop.detector import NoLoops
 from semslam.loop.search import LoopSearch
 from semslam.loop.verification.verifier import LoopVerifier, build_verifier
-from semslam.runtime.stopwatch import Span, Stopwatch
+from semslam.runtime.stopwatch import Calls, Stopwatch
 from semslam.runtime.usage import ProcessUsage, usage_now
 from semslam.runtime.workers import Worker, WorkerKind, make_worker
 from semslam.system.shedding import SheddingVerifier
@@ -49,7 +49,7 @@ class KeyframeAnswer:
         accepted: match and query of the loops that the live graph follows from this keyframe on.
         withdrawn: the same of those that it no longer follows.
         labels: the keyframe's segmentation without confidences, where one was made.
-        spans: when each stage was done.
+        calls: when each stage was done.
         usage: of the process in which loops are closed, so far.
     """
 
@@ -60,7 +60,7 @@ class KeyframeAnswer:
     accepted: tuple[tuple[int, int], ...]
     withdrawn: tuple[tuple[int, int], ...]
     labels: LabelMap | None
-    spans: tuple[Span, ...]
+    calls: tuple[Calls, ...]
     usage: ProcessUsage
 
 
@@ -106,7 +106,7 @@ class LoopClosing:
             accepted=change.accepted,
             withdrawn=change.withdrawn,
             labels=None if self._search.labels is None else replace(self._search.labels, confidence=None),
-            spans=self._stopwatch.take(),
+            calls=self._stopwatch.take(),
             usage=usage_now(),
         )
 

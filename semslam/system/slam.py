@@ -251,7 +251,7 @@ class Slam:
     def _take_in(self, answers: Iterable[KeyframeAnswer]) -> None:
         for answer in answers:
             self._listener(answer)
-            self._stopwatch.add(answer.spans)
+            self._stopwatch.add(answer.calls)
             self._keyframes[answer.keyframe] = replace(self._keyframes[answer.keyframe], details=answer.details)
             self._outcomes += answer.verifications
             for verification in answer.verifications:
