@@ -40,6 +40,8 @@ DETECTORS: dict[str, str] = {
     "semantic-paper": "semslam.loop.detectors.semantic.detector:PaperSemanticDetector",
     "fused": "semslam.loop.detectors.fused.detector:FusedDetector",
     "objects": "semslam.loop.detectors.objects.detector:ObjectsDetector",
+    "topology": "semslam.loop.detectors.topology.detector:TopologyDetector",
+    "subgraph": "semslam.loop.detectors.subgraph.detector:SubgraphDetector",
     "dbow": "semslam.loop.detectors.bag_of_words.detector:DbowDetector",
     "sda": "semslam.loop.detectors.sda.detector:SdaDetector",
     "cnnw": "semslam.loop.detectors.global_descriptor.cnnw:CnnwDetector",

@@ -9,7 +9,7 @@ from semslam.loop.detectors.common.growing import GrowingArray
 from semslam.types import Float32Array, FloatArray, IntArray
 
 Bag = tuple[IntArray, Float32Array]
-"""Words of an image, ascending, and their tf-idf weights, which add up to one."""
+"""Words of an image, ascending, and their weights: tf-idf weights that add up to one, or counts."""
 
 
 RECENT = 128
@@ -81,7 +81,7 @@ class WordIndex:
             self._sort_recent()
 
     def scores(self, bag: Bag) -> FloatArray:
-        """L1 score (N,) in 0..1 with each image: 1 - |v - w| / 2, which is the sum of the smaller weights."""
+        """Sum (N,) of the smaller weights: where weights add up to one the L1 score 1 - |v - w| / 2, in 0..1."""
         top = max(int(self._words.rows.max(initial=0)), int(bag[0].max(initial=0)))
         ours = np.zeros(top + 1, np.float32)
         ours[bag[0]] = bag[1]

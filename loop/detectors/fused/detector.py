@@ -8,13 +8,13 @@ import numpy as np
 import numpy.typing as npt
 
 from semslam.config import Config, LoopConfig, Section, setting
-from semslam.errors import ConfigError
 from semslam.loop.detector import Arrays
 from semslam.loop.detectors.bag_of_words.detector import make_bag
 from semslam.loop.detectors.bag_of_words.vocabulary import Vocabulary, load_vocabulary
 from semslam.loop.detectors.bag_of_words.word_index import Bag, WordIndex, bag_of_arrays, bag_to_arrays
 from semslam.loop.detectors.common.backbone import Backbone
 from semslam.loop.detectors.common.cosine_index import WholeIndex
+from semslam.loop.detectors.common.labels import labels_of
 from semslam.loop.detectors.common.remembering import RememberingDetector
 from semslam.loop.detectors.fused.class_index import ClassIndex
 from semslam.loop.detectors.fused.fusion import ClassFeatures, FusionModel, load_fusion, pool_classes
@@ -119,13 +119,12 @@ class FusedDetector(RememberingDetector[_Look]):
         return _Look(whole, bag_of_arrays(arrays), ClassFeatures(labels, vectors, shares))
 
     def _describe(self, view: KeyframeView) -> _Look:
-        if view.labels is None:
-            raise ConfigError(f"The detector '{self.name}' needs a segmentation, and none came with the keyframe.")
+        segmented = labels_of(view, self.name)
         roll, size = roll_of(view.keyframe.T_odom_cam), self._backbone.size
         encoding = self._backbone.encode(turn_image(shrink(view.color, size), roll))
-        labels = turn_labels(cv2.resize(view.labels.labels, size, interpolation=cv2.INTER_NEAREST), roll)  # type: ignore[arg-type]
-        movable = frozenset(i for i, name in enumerate(view.labels.names) if name in MOVABLE)
-        usual = self._model.usual_features(view.labels.names)
+        labels = turn_labels(cv2.resize(segmented.labels, size, interpolation=cv2.INTER_NEAREST), roll)  # type: ignore[arg-type]
+        movable = frozenset(i for i, name in enumerate(segmented.names) if name in MOVABLE)
+        usual = self._model.usual_features(segmented.names)
         classes = pool_classes(encoding.middle, labels, movable).against(usual)
         bag = make_bag(self._vocabulary, view.keyframe.features.descriptors)
         return _Look(self._model.whole(encoding), bag, classes)

@@ -7,11 +7,11 @@ import numpy as np
 import numpy.typing as npt
 
 from semslam.config import Config, LoopConfig
-from semslam.errors import ConfigError
 from semslam.loop.detector import Arrays
 from semslam.loop.detectors.common.growing import GrowingArray
+from semslam.loop.detectors.common.labels import labels_of
 from semslam.loop.detectors.common.remembering import RememberingDetector
-from semslam.loop.detectors.semantic.nodes import SemanticNodes, extract_nodes
+from semslam.loop.detectors.semantic.nodes import SemanticNodes, extract_nodes, nodes_of_arrays, nodes_to_arrays
 from semslam.loop.detectors.semantic.settings import (
     DistanceReading,
     MatchReading,
@@ -83,19 +83,13 @@ class SemanticDetector(RememberingDetector[SemanticNodes]):
             self._shelves[int(label)].append(position, look.of(label))
 
     def _to_arrays(self, look: SemanticNodes) -> Arrays:
-        return {"labels": look.labels, "uvd": look.uvd, "areas": look.areas}
+        return nodes_to_arrays(look)
 
     def _from_arrays(self, arrays: Arrays) -> SemanticNodes:
-        labels = np.asarray(arrays["labels"], np.uint8)
-        uvd, areas = np.asarray(arrays["uvd"], np.float64), np.asarray(arrays["areas"], np.float64)
-        if uvd.shape != (len(labels), 3) or areas.shape != labels.shape:
-            raise ValueError("no semantic nodes")
-        return SemanticNodes(labels, uvd, areas)
+        return nodes_of_arrays(arrays)
 
     def _describe(self, view: KeyframeView) -> SemanticNodes:
-        if view.labels is None:
-            raise ConfigError(f"The detector '{self.name}' needs a segmentation, and none came with the keyframe.")
-        return extract_nodes(view.labels, view.depth, self._config.nodes)
+        return extract_nodes(labels_of(view, self.name), view.depth, self._config.nodes)
 
     def _score(self, nodes: SemanticNodes, side: int) -> tuple[FloatArray, FloatArray]:
         """Share of similar nodes and of common labels with each remembered keyframe, (N,) each."""

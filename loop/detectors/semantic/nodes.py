@@ -6,7 +6,8 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from semslam.loop.detectors.semantic.settings import DepthReading, NodeConfig
+from semslam.loop.detector import Arrays
+from semslam.loop.detectors.semantic.settings import CentreReading, DepthReading, NodeConfig
 from semslam.types import Float32Array, FloatArray, LabelMap, UInt8Array
 
 REFERENCE_SIDE = 640.0
@@ -34,6 +35,20 @@ class SemanticNodes:
         """(K, 3) u, v, depth of the nodes of one class."""
         nodes: FloatArray = self.uvd[self.labels == label]
         return nodes
+
+
+def nodes_to_arrays(nodes: SemanticNodes) -> Arrays:
+    """Nodes as named arrays."""
+    return {"labels": nodes.labels, "uvd": nodes.uvd, "areas": nodes.areas}
+
+
+def nodes_of_arrays(arrays: Arrays) -> SemanticNodes:
+    """The reverse; a KeyError or ValueError where they are no nodes."""
+    labels = np.asarray(arrays["labels"], np.uint8)
+    uvd, areas = np.asarray(arrays["uvd"], np.float64), np.asarray(arrays["areas"], np.float64)
+    if uvd.shape != (len(labels), 3) or areas.shape != labels.shape:
+        raise ValueError("no semantic nodes")
+    return SemanticNodes(labels, uvd, areas)
 
 
 def extract_nodes(label_map: LabelMap, depth: Float32Array, config: NodeConfig) -> SemanticNodes:
@@ -115,6 +130,9 @@ def _blocks(
     areas = stats[:, cv2.CC_STAT_AREA].astype(np.float64) * step**2
     kept = np.flatnonzero(areas >= config.min_area * mask.size * step**2)
     kept = kept[kept > 0]  # the first component is everything outside the mask
+    if config.centre is CentreReading.BOX:
+        corners = stats[kept][:, [cv2.CC_STAT_LEFT, cv2.CC_STAT_TOP]]
+        centroids[kept] = corners + (stats[kept][:, [cv2.CC_STAT_WIDTH, cv2.CC_STAT_HEIGHT]] - 1) / 2
     centres = step * (centroids[kept] + (left, top)) + (step - 1) / 2
     if config.depth is DepthReading.CENTROID:
         u, v = np.rint(centres).astype(np.int64).T

@@ -16,10 +16,17 @@ class ShareReading(StrEnum):
 
 
 class DepthReading(StrEnum):
-    """Which depth a connected component's node gets: that of the centroid's pixel (the paper), or the median."""
+    """Which depth a connected component's node gets: that of the node's pixel (the paper), or the median."""
 
     CENTROID = "centroid"
     MEDIAN = "median"
+
+
+class CentreReading(StrEnum):
+    """Which point of a connected component is its node: its centroid (the paper), or the centre of its box."""
+
+    CENTROID = "centroid"
+    BOX = "box"
 
 
 class DepthUnit(StrEnum):
@@ -55,6 +62,7 @@ class NodeConfig(Section):
 
     connectivity: Literal[4, 8] = setting(8, "pixel neighbourhood of connected components")
     min_area: float = setting(0.0, "share of the image below which a component is left out", ge=0, lt=1)
+    centre: CentreReading = setting(CentreReading.CENTROID, "which point of a component is its node")
     depth: DepthReading = setting(DepthReading.CENTROID, "which depth a component gets")
     keep_without_depth: bool = setting(True, "keep nodes without depth, at depth 0")
     cluster_radius: float = setting(40.0, "DBSCAN's eps among nodes of one label; 0 = no clustering", unit="px", ge=0)

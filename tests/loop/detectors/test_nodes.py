@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from semslam.loop.detectors.semantic.nodes import SemanticNodes, extract_nodes, merge_dense
-from semslam.loop.detectors.semantic.settings import DepthReading, NodeConfig
+from semslam.loop.detectors.semantic.settings import CentreReading, DepthReading, NodeConfig
 from semslam.types import LabelMap
 
 NAMES = ("void", "wall", "chair", "table")
@@ -71,6 +71,15 @@ def test_diagonal_neighbours_are_one_block_only_under_eight_connectivity() -> No
         len(extract_nodes(label_map(labels), depth, NodeConfig(cluster_radius=0, connectivity=c))) for c in (4, 8)
     ]
     assert counts == [2, 1]
+
+
+def test_a_node_is_the_centroid_or_the_centre_of_the_box() -> None:
+    labels = np.zeros((40, 40))
+    labels[10:30, 10:14] = labels[26:30, 10:30] = 3
+    depth = np.ones((40, 40), np.float32)
+    centroid, box = (extract_nodes(label_map(labels), depth, NodeConfig(centre=c)).uvd[0, :2] for c in CentreReading)
+    np.testing.assert_allclose(box, [19.5, 19.5])
+    assert centroid[0] < 19 < 20 < centroid[1]
 
 
 def test_void_and_an_empty_image_give_no_nodes() -> None:

@@ -1,0 +1,1 @@
+"""Subgraphs of objects with depth."""
