@@ -23,6 +23,8 @@ from semslam.types import Trajectory
 MAX_DIFFERENCE = 0.02
 RPE_INTERVAL = 1.0
 MIN_PAIRS = 3
+MIN_SHARE = 0.05
+"""Share of the poses that ground truth must meet; errors of fewer are no measure of a trajectory."""
 MIN_COVERAGE = 0.5
 TRIPOD = 1e-3
 
@@ -56,7 +58,7 @@ class Similarity:
 
 
 def score_trajectory(
-    estimate: Trajectory, truth: Trajectory, max_difference: float = MAX_DIFFERENCE
+    estimate: Trajectory, truth: Trajectory, max_difference: float = MAX_DIFFERENCE, min_share: float = MIN_SHARE
 ) -> TrajectoryMetrics:
     """Score an estimate where ground truth covers it.
 
@@ -64,11 +66,12 @@ def score_trajectory(
         estimate: poses in any world frame.
         truth: the ground truth.
         max_difference: seconds that associated stamps may differ.
+        min_share: of the poses that must have ground truth.
 
     Raises:
-        TrajectoryError: fewer than three poses have ground truth.
+        TrajectoryError: fewer poses have ground truth, or fewer than three.
     """
-    pairs = associate(estimate, truth, max_difference)
+    pairs = associate(estimate, truth, max_difference, min_share)
     return TrajectoryMetrics.of(
         Comparison(
             position_errors=_position_errors(pairs, fit_alignment(pairs)),
@@ -78,11 +81,19 @@ def score_trajectory(
     )
 
 
-def associate(estimate: Trajectory, truth: Trajectory, max_difference: float = MAX_DIFFERENCE) -> Pairs:
+def associate(
+    estimate: Trajectory, truth: Trajectory, max_difference: float = MAX_DIFFERENCE, min_share: float = MIN_SHARE
+) -> Pairs:
     """Pair poses by time as evo does: each pose of the shorter trajectory with the nearest one of the longer.
 
+    Args:
+        estimate: poses in any world frame.
+        truth: the ground truth.
+        max_difference: seconds that associated stamps may differ.
+        min_share: of the poses that must have a partner.
+
     Raises:
-        TrajectoryError: fewer than three pairs.
+        TrajectoryError: fewer poses have one, or fewer than three.
     """
     from evo.core.sync import SyncException, associate_trajectories
     from evo.core.trajectory import PoseTrajectory3D
@@ -95,10 +106,10 @@ def associate(estimate: Trajectory, truth: Trajectory, max_difference: float = M
         found = matched.num_poses
     except SyncException:
         found = 0
-    if found < MIN_PAIRS:
+    if found < MIN_PAIRS or found < min_share * len(estimate):
         raise TrajectoryError(
-            f"Only {found} of {len(estimate)} poses have ground truth within {max_difference:g} s; the estimate spans"
-            f" {_span(estimate)}, the truth {_span(truth)}."
+            f"Only {found} of {len(estimate)} poses have ground truth within {max_difference:g} s, too few for a score;"
+            f" the estimate spans {_span(estimate)}, the truth {_span(truth)}{_numbered(truth, estimate)}."
         )
     return Pairs(np.asarray(matched.timestamps), np.stack(matched.poses_se3), np.stack(matched_truth.poses_se3))
 
@@ -238,6 +249,30 @@ def _tripods(poses: Transforms) -> FloatArray:
 def _position_errors(pairs: Pairs, alignment: Similarity) -> FloatArray:
     moved = alignment.apply(pairs.estimated)
     return np.asarray(np.linalg.norm(moved[:, :3, 3] - pairs.true[:, :3, 3], axis=1))
+
+
+def score_remark(estimate: Trajectory, truth: Trajectory | None, score: TrajectoryMetrics, poses: int) -> str | None:
+    """What a score does not cover; why there is none; or None.
+
+    Args:
+        estimate: what was scored.
+        truth: the ground truth, if there is any.
+        score: its errors.
+        poses: how many there are, those included that were not tracked.
+    """
+    if truth is not None and score.pairs is None:
+        try:
+            associate(estimate, truth)
+        except TrajectoryError as error:
+            return f"There is no score: {error}"
+    return coverage_remark(score.pairs, poses)
+
+
+def _numbered(truth: Trajectory, estimate: Trajectory) -> str:
+    """A hint where the stamps of the truth are frame numbers, and those of the estimate are not."""
+    if len(truth) > 1 and (np.diff(truth.timestamps) == 1).all() and not (estimate.timestamps % 1 == 0).all():
+        return "; its stamps are frame numbers, not seconds"
+    return ""
 
 
 def _span(trajectory: Trajectory) -> str:

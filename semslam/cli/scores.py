@@ -29,6 +29,10 @@ def eval_command(
     max_difference: Annotated[
         float, typer.Option(min=0.0, callback=options.finite, help="Seconds that associated stamps may differ.")
     ] = 0.02,
+    min_share: Annotated[
+        float,
+        typer.Option(min=0.0, max=1.0, callback=options.finite, help="Share of the poses that must have ground truth."),
+    ] = 0.05,
     rate: Annotated[
         float | None, typer.Option(min=0.001, help="Poses a second of KITTI files without stamps beside them.")
     ] = None,
@@ -41,11 +45,11 @@ def eval_command(
 
     (estimated, estimate_notes), (true, truth_notes) = read_poses(estimate, rate=rate), read_poses(truth, rate=rate)
     remarks([*estimate_notes, *truth_notes])
-    metrics = score_trajectory(estimated, true, max_difference)
+    metrics = score_trajectory(estimated, true, max_difference, min_share)
     few = coverage_remark(metrics.pairs, len(estimated))
     remarks([] if few is None else [few])
     share = coverage(estimated.timestamps, true, max_difference)
-    scale = fit_alignment(associate(estimated, true, max_difference), with_scale=True).scale
+    scale = fit_alignment(associate(estimated, true, max_difference, min_share), with_scale=True).scale
     if as_json:
         typer.echo(json.dumps(metrics.model_dump(mode="json") | {"scale": scale, "coverage": share}))
         return

@@ -57,7 +57,7 @@ def score_run(
     realtime: RealTimeMetrics | None = None,
     sensor: SensorMetrics | None = None,
 ) -> Scores:
-    """Score a run; without ground truth, or where it meets fewer than three poses, the errors are None."""
+    """Score a run; without ground truth, or where it meets too few poses, the errors are None."""
     truth = dataset.ground_truth
     odometry, live, pose_graph, trajectory = _trajectories(slam)
     ledger = _ledger(dataset, slam, config)
@@ -121,7 +121,7 @@ def _trajectories(slam: SlamResult) -> tuple[Trajectory, Trajectory, Trajectory,
 
 
 def _score(estimate: Trajectory, truth: Trajectory | None) -> TrajectoryMetrics:
-    """The errors, all None where there is no ground truth or it meets fewer than three poses."""
+    """The errors, all None where there is no ground truth or it meets too few poses."""
     if truth is None:
         return TrajectoryMetrics()
     try:

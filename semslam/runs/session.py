@@ -10,13 +10,13 @@ from semslam.datasets.feed import Feed
 from semslam.datasets.plausibility import check_plausibility
 from semslam.datasets.prefetch import prefetch
 from semslam.errors import DatasetError, as_our_own
-from semslam.eval.trajectory import coverage_remark
+from semslam.eval.trajectory import score_remark
 from semslam.loop.verification.verifier import LoopVerifier
 from semslam.maps.cloud import join_clouds
 from semslam.runs.clock import RunClock
 from semslam.runs.journal import Journal, JournalError
 from semslam.runs.latency import Latencies
-from semslam.runs.metrics import Metrics, SensorMetrics
+from semslam.runs.metrics import SensorMetrics
 from semslam.runs.realtime import measure_realtime, realtime_notes
 from semslam.runs.recording import RecordedFrame, Recording, checksum
 from semslam.runs.result import PartialRunError, RunResult
@@ -218,7 +218,7 @@ class Session:
                 self._checksum,
             ),
             notes=(
-                *self._doubts(slam, scores.metrics),
+                *self._doubts(slam, scores),
                 *([] if self._feed is None else realtime_notes(self._feed, slam)),
                 *self._dataset.notes,
                 *self._unreadable,
@@ -228,10 +228,11 @@ class Session:
             ),
         )
 
-    def _doubts(self, slam: SlamResult, metrics: Metrics) -> list[str]:
-        """What looks wrong with the sequence, and with a score that stands for few of its frames."""
+    def _doubts(self, slam: SlamResult, scores: Scores) -> list[str]:
+        """What looks wrong with the sequence, and with a score that stands for few of its frames or for none."""
         found = check_plausibility(self._dataset, [state.index for state in slam.frames]) if self._looks else ()
-        remark = coverage_remark(metrics.optimized.pairs, metrics.frames)
+        metrics, truth = scores.metrics, self._dataset.ground_truth
+        remark = score_remark(scores.trajectory, truth, metrics.optimized, metrics.frames)
         return [*(doubt.sentence for doubt in found), *([] if remark is None else [remark])]
 
 

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from semslam.datasets.tum_format import read_trajectory
 from semslam.errors import TrajectoryError
+from semslam.eval.metrics import TrajectoryMetrics
 from semslam.eval.trajectory import (
     align,
     associate,
@@ -19,6 +20,7 @@ from semslam.eval.trajectory import (
     fit_alignment,
     poses_at,
     position_errors,
+    score_remark,
     score_trajectory,
 )
 from semslam.geometry.se3 import exp_so3, make_transform, rotation_angle
@@ -177,6 +179,20 @@ def test_coverage_counts_frames_near_truth() -> None:
     assert coverage(np.arange(60) / 30, truth) == pytest.approx(31 / 60)
     assert coverage([], truth) == 0.0
     assert coverage([0.5], Trajectory(np.empty(0), np.empty((0, 4, 4)))) == 0.0
+
+
+def test_a_score_of_a_few_percent_of_the_poses_is_given_only_when_asked_for() -> None:
+    """The ground truth of ICL-NUIM as it comes, with frame numbers for stamps, meets one pose in thirty."""
+    truth = wander(count=200)
+    numbered = Trajectory(np.arange(len(truth), dtype=np.float64), truth.poses)
+    with pytest.raises(TrajectoryError, match=r"Only 7 of 200 poses .* its stamps are frame numbers"):
+        score_trajectory(truth, numbered)
+    assert score_trajectory(truth, numbered, min_share=0.0).pairs == 7
+    remark = score_remark(truth, numbered, TrajectoryMetrics(), len(truth))
+    assert remark is not None
+    assert remark.startswith("There is no score: Only 7 of 200")
+    assert score_remark(truth, None, TrajectoryMetrics(), len(truth)) is None
+    assert score_remark(truth, truth, score_trajectory(truth, truth), len(truth)) is None
 
 
 def test_interpolation_meets_the_truth_and_halves_the_way() -> None:

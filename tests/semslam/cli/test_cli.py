@@ -103,6 +103,17 @@ def test_eval_prints_json_for_tools(semslam: Call, tmp_path: Path) -> None:
     assert scores["coverage"] == 1.0
 
 
+def test_eval_refuses_to_score_a_few_percent_of_the_poses(semslam: Call, tmp_path: Path) -> None:
+    pose = " 0 0 0 0 0 0 1\n"
+    (tmp_path / "estimate.txt").write_text("".join(f"{index / 30:.4f}{pose}" for index in range(120)))
+    (tmp_path / "truth.txt").write_text("".join(f"{index}{pose}" for index in range(880)))
+    files = tmp_path / "estimate.txt", tmp_path / "truth.txt"
+    refused = semslam("eval", *files)
+    assert (refused.code, refused.out) == (2, "")
+    assert "Only 4 of 120 poses" in refused.err
+    assert json.loads(semslam("eval", *files, "--min-share", 0, "--json").out)["pairs"] == 4
+
+
 def test_config_prints_settings_that_run_accepts(semslam: Call, tmp_path: Path) -> None:
     file = tmp_path / "mine.yaml"
     file.write_text(semslam("config", "--set", "keyframes.interval=0.25").out)
