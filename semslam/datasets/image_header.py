@@ -17,7 +17,9 @@ MAX_SIDE = 2**15
 JPEG = "JPEG"
 
 _PNG_START, _JPEG_START, _JPEG_END = b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff", b"\xff\xd9"
-_PILLOW_FORMATS = ("TIFF", "BMP", "PPM")
+_PILLOW_FORMATS = ("BMP", "PPM")
+_TIFF_STARTS = {b"II*\0": "<", b"MM\0*": ">"}
+_WIDTH, _HEIGHT = 256, 257
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,6 +49,8 @@ def read_header(data: bytes, name: str) -> ImageHeader:
         header = _png_header(data, name)
     elif data.startswith(_JPEG_START):
         header = _jpeg_header(data, name)
+    elif data[:4] in _TIFF_STARTS:
+        header = _tiff_header(data, name)
     else:
         header = _other_header(data, name)
     if min(header.width, header.height) < 1:
@@ -84,6 +88,23 @@ def _jpeg_header(data: bytes, name: str) -> ImageHeader:
     except ValueError as error:
         raise DatasetError(f"{name} cannot be decoded: it is damaged or no image.") from error
     return ImageHeader(JPEG, width, height)
+
+
+def _tiff_header(data: bytes, name: str) -> ImageHeader:
+    """Of the first image in the file; read here, since Pillow knows no 64-bit floats (TIFF 6.0, section 2)."""
+    order = _TIFF_STARTS[data[:4]]
+    try:
+        (place,) = struct.unpack_from(f"{order}I", data, 4)
+        (count,) = struct.unpack_from(f"{order}H", data, place)
+        sizes = {}
+        for entry in range(place + 2, place + 2 + 12 * count, 12):
+            tag, kind = struct.unpack_from(f"{order}HH", data, entry)
+            if tag in (_WIDTH, _HEIGHT):
+                (value,) = struct.unpack_from(f"{order}{'H' if kind == 3 else 'I'}", data, entry + 8)
+                sizes.setdefault(tag, value)  # of a tag that stands twice, decoders take the first
+        return ImageHeader("TIFF", sizes[_WIDTH], sizes[_HEIGHT])
+    except (struct.error, KeyError) as error:
+        raise DatasetError(f"{name} cannot be decoded: it is damaged or no image.") from error
 
 
 def _other_header(data: bytes, name: str) -> ImageHeader:

@@ -122,7 +122,7 @@ def decode_depth(
     if raw.ndim != 2:
         raise DatasetError(f"{name} has {raw.shape[2]} channels; depth has one.")
     if raw.dtype != np.uint16 and not np.issubdtype(raw.dtype, np.floating):
-        raise DatasetError(f"{name} holds {raw.dtype} values; depth needs 16 bits.")
+        raise DatasetError(f"{name} holds {raw.dtype} values; depth is uint16, float32 or float64.")
     depth = to_metres(raw, scale)
     if missing is not None:
         depth[raw == missing] = 0.0

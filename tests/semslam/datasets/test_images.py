@@ -11,7 +11,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from semslam.datasets.images import DepthScale, decode_color, decode_depth, read_color, read_depth, read_labels
+from semslam.datasets.images import (
+    DepthScale,
+    decode_color,
+    decode_depth,
+    image_size,
+    read_color,
+    read_depth,
+    read_labels,
+)
 from semslam.errors import DatasetError
 
 RNG = np.random.default_rng(0)
@@ -100,7 +108,7 @@ def test_the_wrong_size_is_refused(tmp_path: Path) -> None:
 def test_depth_of_8_bits_or_three_channels_is_refused(tmp_path: Path) -> None:
     cv2.imwrite(str(tmp_path / "8.png"), COLOR[..., 0])
     cv2.imwrite(str(tmp_path / "rgb.png"), COLOR)
-    with pytest.raises(DatasetError, match="16 bits"):
+    with pytest.raises(DatasetError, match="uint8 values"):
         read_depth(tmp_path / "8.png", DepthScale(1000.0))
     with pytest.raises(DatasetError, match="3 channels"):
         read_depth(tmp_path / "rgb.png", DepthScale(1000.0))
@@ -200,6 +208,15 @@ def test_whole_and_floating_point_depth_have_scales_of_their_own(tmp_path: Path)
     assert read_depth(tmp_path / "f.tiff", DepthScale(5000.0, 2.0)).max() == 1.0
     cv2.imwrite(str(tmp_path / "f.tiff"), np.full((4, 4), 1e38, np.float32))
     assert read_depth(tmp_path / "f.tiff", DepthScale(1.0)).max() == 0.0
+
+
+def test_depth_may_have_64_bits_and_other_kinds_are_named(tmp_path: Path) -> None:
+    cv2.imwrite(str(tmp_path / "d.tiff"), np.full((4, 6), 2.5, np.float64))
+    assert read_depth(tmp_path / "d.tiff", DepthScale(5000.0)).max() == 2.5
+    assert image_size(tmp_path / "d.tiff") == (6, 4)
+    cv2.imwrite(str(tmp_path / "d.tiff"), np.full((4, 6), 2500, np.int32))
+    with pytest.raises(DatasetError, match="holds int32 values; depth is uint16, float32 or float64"):
+        read_depth(tmp_path / "d.tiff", DepthScale(5000.0))
 
 
 @pytest.mark.parametrize("suffix", [".png", ".jpg", ".tiff", ".bmp", ".ppm"])
