@@ -52,6 +52,10 @@ class ModelError(SemslamError):
     """Network weights are missing, of another network, or damaged."""
 
 
+FOREIGN = (Exception, SystemExit)
+"""What a part from outside may raise: one that calls ``sys.exit`` must not end a run in silence."""
+
+
 def as_our_own(error: BaseException) -> SemslamError:
     """An error of any kind as one clear sentence."""
     if isinstance(error, SemslamError):

@@ -10,7 +10,7 @@ from pathlib import Path
 from semslam import plugins
 from semslam.config import DatasetConfig
 from semslam.datasets.dataset import Dataset, DatasetLoader
-from semslam.errors import ConfigError, DatasetError, SemslamWarning, as_our_own
+from semslam.errors import FOREIGN, ConfigError, DatasetError, SemslamWarning, as_our_own
 
 __all__ = ["Dataset", "DatasetLoader", "open_dataset"]
 
@@ -50,7 +50,7 @@ def open_dataset(path: str | Path, config: DatasetConfig | None = None, *, loade
         raise DatasetError(f"{path} cannot be read: {error.strerror or error}.") from error
     except UnicodeError as error:
         raise DatasetError(f"{path} is no path.") from error
-    except Exception as error:  # a loader from outside may raise what it likes
+    except FOREIGN as error:  # a loader from outside may raise what it likes
         raise as_our_own(error) from error
     if config.faults != type(config.faults)():
         from semslam.datasets.faults import FaultyDataset
@@ -92,7 +92,7 @@ def guess_loader(path: str | Path) -> str:
         try:
             loader: type[DatasetLoader] = plugins.load("semslam.datasets", name)
             its_own = loader.recognises(place)
-        except Exception as error:  # a broken plug-in must not keep the others from being asked
+        except FOREIGN as error:  # a broken plug-in must not keep the others from being asked
             if name in plugins.DATASETS:
                 raise
             warnings.warn(f"The loader '{name}' is passed over: {as_our_own(error)}", SemslamWarning, stacklevel=2)

@@ -7,7 +7,7 @@ from semslam.config import Config
 from semslam.datasets.camera_file import CameraSetup
 from semslam.datasets.dataset import Dataset
 from semslam.datasets.selection import ChosenFrames
-from semslam.errors import DatasetError
+from semslam.errors import FOREIGN, DatasetError
 from semslam.frontend.feature_map.odometry import FeatureMapOdometry
 from semslam.frontend.prediction import check_frame
 from semslam.frontend.sensor.calibration import calibrate
@@ -84,7 +84,7 @@ def _first(dataset: Dataset) -> Iterator[Frame]:
             check_frame(frame)
         except DatasetError:
             continue
-        except Exception:  # whatever a plug-in or a library raises: the run meets it at the same frame
+        except FOREIGN:  # whatever a plug-in or a library raises: the run meets it at the same frame
             return
         yield frame
 

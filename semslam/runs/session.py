@@ -9,7 +9,7 @@ from semslam.datasets.dataset import Dataset
 from semslam.datasets.feed import Feed
 from semslam.datasets.plausibility import check_plausibility
 from semslam.datasets.prefetch import prefetch
-from semslam.errors import DatasetError, as_our_own
+from semslam.errors import FOREIGN, DatasetError, as_our_own
 from semslam.eval.trajectory import score_remark
 from semslam.loop.verification.verifier import LoopVerifier
 from semslam.maps.cloud import join_clouds
@@ -57,7 +57,7 @@ class Session:
         worker = _worker(config, len(dataset), realtime)
         try:
             self._slam = Slam.from_config(config, self._stopwatch, verifier, worker, self._show_answer, realtime)
-        except Exception as error:  # what a part from outside raises when it is built
+        except FOREIGN as error:  # what a part from outside raises when it is built
             raise as_our_own(error) from error
         self._sensor: SensorMetrics | None = None
         self._unreadable: list[str] = []
@@ -71,8 +71,7 @@ class Session:
         """Read and track every frame."""
         self._looks = True
         self._know_sensor()
-        if self._feed is not None:
-            self._slam.wait_until_ready()
+        self._slam.wait_until_ready()  # what cannot be built is known before the first frame
         for index, item, came in self._frames():
             if isinstance(item, DatasetError):
                 self._unreadable.append(str(item))
@@ -103,6 +102,7 @@ class Session:
 
     def repeat(self, recording: Recording) -> Iterator[tuple[int, FrameState]]:
         """Take each frame's motion from a recording."""
+        self._slam.wait_until_ready()
         self._unreadable.extend(recording.unreadable)
         self._checksum, self._interrupted = recording.checksum, recording.interrupted
         for frame in recording.frames:
@@ -156,7 +156,7 @@ class Session:
             self._interrupted = True
         except JournalError:
             raise
-        except Exception as error:  # whatever a dataset, a plug-in or a library may raise: nothing computed is lost
+        except FOREIGN as error:  # whatever a dataset, a plug-in or a library may raise: nothing computed is lost
             if not self._tracked:
                 raise as_our_own(error) from error
             self._interrupted, self._failure = True, error
@@ -181,12 +181,12 @@ class Session:
         """The optimised run; where a keyframe's loops could not be closed, without the loops from there on."""
         try:
             return self._slam.finish()
-        except Exception as error:  # what a detector, a segmenter or a verifier raised, perhaps in another process
+        except FOREIGN as error:  # what a detector, a segmenter or a verifier raised, perhaps in another process
             self._slam.leave_pending()
             self._interrupted, self._failure = True, self._failure or error
         try:
             return self._slam.finish()
-        except Exception as error:
+        except FOREIGN as error:
             raise as_our_own(error) from error
 
     def _joined(self, slam: SlamResult, error: str | None) -> RunResult:

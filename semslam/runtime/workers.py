@@ -11,7 +11,7 @@ from enum import StrEnum
 from threading import Thread
 from typing import Any, Generic, TypeVar
 
-from semslam.errors import ConfigError, SemslamError
+from semslam.errors import FOREIGN, ConfigError, SemslamError
 
 Job = TypeVar("Job")
 Answer = TypeVar("Answer")
@@ -43,7 +43,12 @@ class Worker(ABC, Generic[Job, Answer]):
         """Finish the jobs that are left, and end."""
 
     def wait_until_ready(self) -> None:
-        """Wait until jobs are begun as soon as they are submitted."""
+        """Wait until jobs are begun as soon as they are submitted.
+
+        Raises:
+            SemslamError: the worker's process has ended.
+            Exception: what making the function that does the work raised.
+        """
 
 
 class InlineWorker(Worker[Job, Answer]):
@@ -57,7 +62,7 @@ class InlineWorker(Worker[Job, Answer]):
         future: Future[Answer] = Future()
         try:
             future.set_result(self._work(job))
-        except Exception as error:
+        except FOREIGN as error:
             future.set_exception(error)
         return future
 
@@ -104,8 +109,8 @@ class ProcessWorker(Worker[Job, Answer]):
         self._pool.shutdown(wait=True)
 
     def wait_until_ready(self) -> None:
-        """See ``Worker``; a process that does not start is an error of the first job's answer."""
-        self._prepared.exception()
+        """See ``Worker``."""
+        answer_of(self._prepared)
 
 
 def answer_of(future: "Future[Answer]") -> Answer:
@@ -166,8 +171,9 @@ def _prepare(pickled: bytes) -> None:
     try:
         make: Make[Any, Any] = pickle.loads(pickled)
         _prepared.append(make())
-    except Exception as error:  # whatever a plug-in raises; the first job hands it to the caller
+    except FOREIGN as error:  # whatever a plug-in raises; where nobody waits for it, the first job hands it on
         _prepared.append(error)
+        raise
 
 
 def _work(job: Any) -> Any:

@@ -123,7 +123,7 @@ def build_closing(
 
     Raises:
         ConfigError: a name is unknown.
-        ModelError: the network's weights are missing or damaged; a process raises it at the first keyframe's answer.
+        ModelError: the network's weights are missing or damaged; a process raises it in ``wait_until_ready``.
     """
     if config.detector == NoLoops.name:
         return None

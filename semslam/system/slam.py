@@ -211,7 +211,11 @@ class Slam:
             self._queue.leave()
 
     def wait_until_ready(self) -> None:
-        """Wait until loop closing has started."""
+        """Wait until loop closing has started.
+
+        Raises:
+            Exception: what a part of it raised when it was built.
+        """
         if self._closing is not None:
             self._closing.wait_until_ready()
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from semslam.config import load_saved_config
 from semslam.datasets import open_dataset
 from semslam.datasets.dataset import Dataset
-from semslam.errors import ResultsError, SemslamError
+from semslam.errors import FOREIGN, ResultsError, SemslamError
 from semslam.runs.journal import JOURNAL, JournalContent, JournalError, JournalHeader, read_journal
 from semslam.runs.journaled import run_journaled
 from semslam.runs.manifest import UNFINISHED
@@ -51,7 +51,7 @@ def make_run(job: Job, progress: Progress = _silent) -> Outcome:
         return _finished_before(job) or _make(job, progress)
     except SemslamError as error:
         return Outcome(job.case, None, str(error))
-    except Exception as error:  # a sweep of hundreds of runs must outlive whatever a plug-in does in one of them
+    except FOREIGN as error:  # a sweep of hundreds of runs must outlive whatever a plug-in does in one of them
         return Outcome(job.case, None, f"{type(error).__name__}: {error}")
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from semslam.config import Config
+from semslam.errors import ModelError
 from semslam.loop.detectors.global_descriptor.thumbnail import ThumbnailDetector
 from semslam.runs.pipeline import PartialRunError, run
 from semslam.runs.results import read_run
@@ -123,3 +124,19 @@ def test_a_detector_that_raises_costs_its_loops_alone(
         run(replace(wall, frames=12), config)
     assert ended.value.result.metrics.tracked >= 3
     assert ended.value.result.metrics.error == str(ended.value)
+
+
+@pytest.mark.parametrize("worker", ["none", "process"])
+def test_what_cannot_be_built_is_known_before_the_first_frame(worker: str) -> None:
+    config = Config(detector="semantic").with_changes(loops={"worker": worker}, segmentation={"weights": "nowhere.pt"})
+    seen: list[int] = []
+    with pytest.raises(ModelError, match="no network weights at"):
+        run(WallDataset(), config, lambda index, _: seen.append(index))
+    assert not seen
+
+
+def test_a_part_that_leaves_the_program_ends_the_run_as_an_error_does(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(ThumbnailDetector, "query", lambda *_: sys.exit(0))
+    config = Config(detector="thumbnail").with_changes(loops={"worker": "none"})
+    with pytest.raises(PartialRunError, match="SystemExit: 0"):
+        run(WallDataset(), config)

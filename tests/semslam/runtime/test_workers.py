@@ -69,6 +69,24 @@ def test_work_that_cannot_be_made_is_an_error_of_ours(kind: WorkerKind) -> None:
         make_worker(kind, unmakeable).submit(1).result()
 
 
+@pytest.mark.parametrize("kind", WorkerKind)
+def test_work_that_cannot_be_made_is_known_before_the_first_job(kind: WorkerKind) -> None:
+    with pytest.raises(ModelError, match="no weights"):
+        make_worker(kind, unmakeable).wait_until_ready()
+
+
+def leaving() -> Callable[[int], int]:
+    return sys.exit
+
+
+@pytest.mark.parametrize("kind", WorkerKind)
+def test_a_part_that_leaves_the_program_is_an_error_of_its_job(kind: WorkerKind) -> None:
+    worker = make_worker(kind, leaving)
+    with pytest.raises(SystemExit):
+        answer_of(worker.submit(0))
+    worker.close()
+
+
 def test_a_process_ignores_ctrl_c() -> None:
     worker = make_worker(WorkerKind.PROCESS, summing)
     _, process = worker.submit(1).result()
