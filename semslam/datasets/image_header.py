@@ -96,7 +96,7 @@ def _tiff_header(data: bytes, name: str) -> ImageHeader:
     try:
         (place,) = struct.unpack_from(f"{order}I", data, 4)
         (count,) = struct.unpack_from(f"{order}H", data, place)
-        sizes = {}
+        sizes: dict[int, int] = {}
         for entry in range(place + 2, place + 2 + 12 * count, 12):
             tag, kind = struct.unpack_from(f"{order}HH", data, entry)
             if tag in (_WIDTH, _HEIGHT):

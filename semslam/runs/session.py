@@ -65,7 +65,7 @@ class Session:
         self._interrupted = False
         self._looks = False  # at the sequence; a replay leaves the images alone, which were looked at when recorded
         self._done = self._tracked = 0
-        self._failure: Exception | None = None
+        self._failure: BaseException | None = None
 
     def track(self) -> Iterator[tuple[int, FrameState | None]]:
         """Read and track every frame."""

@@ -150,7 +150,7 @@ def make_worker(kind: WorkerKind, make: Make[Job, Answer]) -> Worker[Job, Answer
     return ThreadWorker(make) if kind is WorkerKind.THREAD else InlineWorker(make)
 
 
-_prepared: list[Callable[[Any], Any] | Exception] = []
+_prepared: list[Callable[[Any], Any] | BaseException] = []
 """In a worker's process: the function that does its work, or why there is none."""
 
 
@@ -178,6 +178,6 @@ def _prepare(pickled: bytes) -> None:
 
 def _work(job: Any) -> Any:
     (work,) = _prepared
-    if isinstance(work, Exception):
+    if isinstance(work, BaseException):
         raise work
     return work(job)
