@@ -5,12 +5,14 @@
 
 The sequence is run forwards and backwards, again and again, in one run of so many frames (50 000 are 28 minutes at 30
 frames a second), its images reduced to ``--width``. Every ``--every`` frames a line of a Markdown table states what the
-process holds; the last lines give the growth from the middle of the run to its end, where caches are full.
+process holds, and the tracking thread's processor time for a frame since the line before (99 % of the frames, and the
+worst); the last lines give the growth from the middle of the run to its end, where caches are full.
 """
 
 import argparse
 import gc
 import threading
+import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -73,9 +75,12 @@ class Sample:
     threads: int
     files: int
     objects: int
+    p99_ms: float
+    worst_ms: float
 
     def __str__(self) -> str:
-        values = (self.frames, self.keyframes, f"{self.megabytes:.1f}", self.threads, self.files, self.objects)
+        times = f"{self.p99_ms:.1f}", f"{self.worst_ms:.1f}"
+        values = (self.frames, self.keyframes, f"{self.megabytes:.1f}", self.threads, self.files, self.objects, *times)
         return f"| {' | '.join(map(str, values))} |"
 
 
@@ -89,18 +94,23 @@ def measure(dataset: Palindrome, arguments: argparse.Namespace) -> list[Sample]:
     config = load_config(None, parse_overrides(arguments.set))
     config = config.with_changes(odometry=arguments.odometry, detector=arguments.detector)
     samples: list[Sample] = []
-    keyframes = 0
+    keyframes, before = 0, time.thread_time()
+    spent: list[float] = []
 
     def look(index: int, state: FrameState | None) -> None:
-        nonlocal keyframes
+        nonlocal keyframes, before
+        spent.append(1e3 * (time.thread_time() - before))
         keyframes += state is not None and state.keyframe is not None
         if (index + 1) % arguments.every == 0:
             gc.collect()
             held = (threading.active_count(), len(list(Path("/proc/self/fd").iterdir())), len(gc.get_objects()))
-            samples.append(Sample(index + 1, keyframes, resident_megabytes(), *held))
+            times = float(np.quantile(spent, 0.99)), max(spent)
+            samples.append(Sample(index + 1, keyframes, resident_megabytes(), *held, *times))
             print(samples[-1], flush=True)
+            spent.clear()
+        before = time.thread_time()
 
-    run(dataset, config, look)
+    print(f"\n{run(dataset, config, look).metrics.model_dump_json(include={'time', 'maps', 'loops'})}")
     return samples
 
 
@@ -115,7 +125,8 @@ def main() -> None:
     parser.add_argument("--set", action="append", default=[])
     arguments = parser.parse_args()
     dataset = Palindrome(open_dataset(arguments.sequence), arguments.frames, arguments.width)
-    print("| frames | keyframes | resident MB | threads | open files | Python objects |\n|---|---|---|---|---|---|")
+    titles = "frames", "keyframes", "resident MB", "threads", "open files", "Python objects", "p99 ms", "worst ms"
+    print(f"| {' | '.join(titles)} |\n|{'---|' * len(titles)}")
     samples = measure(dataset, arguments)
     middle, last = samples[len(samples) // 2 - 1], samples[-1]
     frames, kilobytes = last.frames - middle.frames, 1024 * (last.megabytes - middle.megabytes)

@@ -108,6 +108,19 @@ def _kill_twice(bench: Bench) -> str:
     return resumed(bench, out)
 
 
+@kills.fault("SIGKILL of a run in real time (`--realtime`)")
+def _kill_realtime(bench: Bench) -> str:
+    out = bench.new()
+    process = bench.start(*bench.words(out, "--realtime", "--rate", 15))
+    wait_for(lambda: tracking(out), process)
+    process.kill()
+    ended(process)
+    bench.semslam("run", "--resume", out).expect(0, "it ends with them")
+    if not saved(out).tracked:
+        raise UnexpectedOutcomeError("Nothing was tracked.")
+    return "exit code 0; the frames until the kill are optimised, scored and written"
+
+
 @kills.fault("a power cut: the journal ends within a record")
 def _power_cut(bench: Bench) -> str:
     out = killed(bench, tracking)

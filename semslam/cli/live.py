@@ -50,7 +50,7 @@ def live_command(
     with stop_on_signals() as stop:
         with reservation as place:
             viewer = viewer_for(place.directory.name, rerun_file, visualize)
-            task = Task(camera, chosen, source, plots, sys.argv, viewer=viewer, feed=camera, profile=profile)
+            task = Task(camera, chosen, source, plots, sys.argv, viewer=viewer, feed=camera, once=True, profile=profile)
             done = carry_out(task, place, stop)
         if viewer is not None:
             viewer.close()

@@ -33,6 +33,7 @@ class Task:
     """What is to be run: with a recording from its motions, with a feed in real time.
 
     Attributes:
+        once: whether the frames of the feed cannot be read again.
         profile: whether its account of time is written and printed.
     """
 
@@ -45,6 +46,7 @@ class Task:
     recording: "Recording | None" = None
     viewer: "Viewer | None" = None
     feed: "Feed | None" = None
+    once: bool = False
     profile: bool = False
 
 
@@ -77,27 +79,26 @@ def carry_out(task: Task, place: "RunPlace", stop: "Stop", past: "JournalContent
     except ResultsError as error:
         # Hours of tracking must not die with a full disk: show what was found, and keep the journal.
         out.print(metrics_table([result.metrics], task.dataset.name))
-        kept = f"; go on by semslam run --resume {place.directory}" if task.feed is None else ""
-        raise ResultsError(f"{error} The run is finished, but could not be saved{kept}.") from error
+        kept = f"go on by semslam run --resume {place.directory}"
+        raise ResultsError(f"{error} The run is finished, but could not be saved; {kept}.") from error
     remarks(result.notes)
     reason = shortfall(result.metrics, result.slam.keyframes)
     return Done(place.directory, result.metrics, result.profile, result.metrics.interrupted, failure, reason)
 
 
 def _computed(task: Task, place: "RunPlace", stop: "Stop", past: "JournalContent | None") -> "RunResult":
-    """Compute a run, with a journal beside the run folder unless its frames do not come again."""
+    """Compute a run, with a journal beside the run folder."""
     from semslam.runs.journal import JournalHeader
     from semslam.runs.journaled import run_journaled
-    from semslam.runs.pipeline import run
 
     dataset, config, recording = task.dataset, task.config, task.recording
     frames = len(dataset) or None  # a camera has none yet
     with bar(f"{dataset.name} {config.detector}", frames) as update:
         progress = frame_progress(update, frames)
-        if task.feed is not None:
-            return run(dataset, config, progress, task.viewer, stop, feed=task.feed)
-        header = JournalHeader.of(config, task.source, task.plots, task.saved_run, task.command)
-        return run_journaled(dataset, config, header, place, progress, stop, past, recording, task.viewer)
+        camera = dataset.intrinsics if task.once else None
+        realtime = task.feed is not None
+        header = JournalHeader.of(config, task.source, task.plots, task.saved_run, task.command, realtime, camera)
+        return run_journaled(dataset, config, header, place, progress, stop, past, recording, task.viewer, task.feed)
 
 
 def show(done: Done, task: Task, as_json: bool = False) -> None:

@@ -115,7 +115,7 @@ def run_command(
         with reservation as place:
             viewer = viewer_for(place.directory.name, rerun_file, visualize)
             feed = RealTimeFeed(dataset, rate) if realtime else None
-            task = Task(dataset, chosen, source, plots, sys.argv, saved_run, recording, viewer, feed, profile)
+            task = Task(dataset, chosen, source, plots, sys.argv, saved_run, recording, viewer, feed, profile=profile)
             done = carry_out(task, place, stop)
         if viewer is not None:
             viewer.close()
@@ -127,26 +127,21 @@ def run_command(
 
 def _resume(directory: Path, sequence: str | None, as_json: bool) -> None:
     """Go on with a run that was killed, as its journal has it."""
-    from semslam.config import load_saved_config
-    from semslam.datasets import open_dataset
     from semslam.runs.journal import JOURNAL, read_journal
     from semslam.runs.place import link_latest, reopened
-    from semslam.runs.recording import read_front_end
+    from semslam.runs.resuming import frames_of, motions_of, settings_of
     from semslam.runtime.stopping import stop_on_signals
 
     with stop_on_signals() as stop:
         with reopened(directory) as place:
             past = read_journal(place.work / JOURNAL)
-            header = past.header
-            settings = place.work / "config.yaml"
-            settings.write_text(header.config, encoding="utf-8")
-            config = load_saved_config(settings)
+            header, config, recording = past.header, settings_of(past, place.work), motions_of(past)
+            dataset = frames_of(past, place.work, config, sequence)
             saved_run = None if header.saved_run is None else Path(header.saved_run)
-            recording = None if saved_run is None else read_front_end(saved_run).recording
             source = sequence or header.source
-            dataset = open_dataset(source, config=config.dataset)
             task = Task(dataset, config, source, header.plots, header.command, saved_run, recording)
-            remark(f"Goes on with a run of {len(past.frames)} frames; they are tracked again, their loops are known.")
+            what = "it ends with them" if header.realtime else "they are tracked again, their loops are known"
+            remark(f"Goes on with a run of {len(past.frames)} frames; {what}.")
             done = carry_out(task, place, stop, past)
         if done.directory.resolve().parent == options.RUNS.resolve():
             link_latest(options.RUNS, done.directory)

@@ -2,39 +2,51 @@
 
 The file is a row of records, each with its length and a CRC-32. A record that a crash has cut short, and whatever
 follows a damaged one, is left out when the journal is read, and cut off when the run is resumed.
+
+Frames that come in real time are not tracked again, so the journal of such a run also holds the landmarks of each
+keyframe and, where the frames come only once, keeps its images beside it.
 """
 
 import errno
 import json
 import os
-import struct
 import time
-import zlib
 from collections import defaultdict, deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Self
 
-import numpy as np
-
 from semslam import __version__
 from semslam.config import Config
+from semslam.datasets.kept_images import KeptImages
 from semslam.errors import ResultsError
 from semslam.loop.verification.verifier import LoopVerifier, build_verifier
 from semslam.runs.files import reason
+from semslam.runs.journal_records import (
+    HEAD,
+    frame_record,
+    framed,
+    landmarks_record,
+    outcome_of,
+    outcome_record,
+    whole_records,
+)
 from semslam.system.result import FrameState
 from semslam.types import (
+    Frame,
+    Intrinsics,
     Keyframe,
     LoopCandidate,
-    LoopConstraint,
     LoopRejection,
+    Observations,
     RejectionReason,
     Verification,
 )
 
 JOURNAL = "journal"
-HEAD = struct.Struct("<II")
+KEYFRAMES = "keyframes"
+"""Folder of the images of keyframes, beside the journal."""
 SYNC_INTERVAL = 5.0
 """Seconds between two moments at which the disk is made to hold what was written: what a power cut can cost."""
 
@@ -51,6 +63,8 @@ class JournalHeader:
         plots: whether pictures are drawn.
         saved_run: the run whose motions are repeated, or None.
         command: the command line.
+        realtime: whether frames came at their own time, and do not come again in that way.
+        camera: what the camera's intrinsics are made of, where its frames come only once.
         version: of semslam.
     """
 
@@ -59,6 +73,8 @@ class JournalHeader:
     plots: bool
     saved_run: str | None
     command: tuple[str, ...]
+    realtime: bool = False
+    camera: dict[str, Any] | None = None
     version: str = __version__
 
     @classmethod
@@ -69,11 +85,21 @@ class JournalHeader:
         plots: bool,
         saved_run: Path | None,
         command: Sequence[str],
+        realtime: bool = False,
+        camera: Intrinsics | None = None,
     ) -> Self:
         """The header of a run; paths are absolute, since it may be resumed from another folder."""
         whole = str(Path(source).resolve()) if Path(source).exists() else source
         saved = None if saved_run is None else str(saved_run.resolve())
-        return cls(config.dump(), whole, plots, saved, tuple(command))
+        once = None if camera is None else asdict(camera)
+        return cls(config.dump(), whole, plots, saved, tuple(command), realtime, once)
+
+    @property
+    def intrinsics(self) -> Intrinsics | None:
+        """The camera whose frames come only once, if it is one."""
+        if self.camera is None:
+            return None
+        return Intrinsics(**self.camera | {"distortion": tuple(self.camera["distortion"])})
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,12 +109,14 @@ class JournalContent:
     Attributes:
         header: what the run was asked to do.
         frames: the record of each frame that was done.
+        landmarks: of keyframes of a run in real time, by their place in ``frames``.
         outcomes: outcomes of candidates by query and match, in order.
         length: bytes until the last whole record.
     """
 
     header: JournalHeader
     frames: tuple[bytes, ...]
+    landmarks: dict[int, bytes]
     outcomes: dict[Pair, tuple[Verification, ...]]
     length: int
 
@@ -110,15 +138,31 @@ class Journal:
 
     def __init__(self, path: Path, header: JournalHeader, past: JournalContent | None = None) -> None:
         self.note: str | None = None
+        self._header = header
         self._past = deque(past.frames if past else ())
         self._known = sum(len(some) for some in past.outcomes.values()) if past else 0
         self._file = path.open("r+b" if past else "wb", buffering=0)
         self._synced = -SYNC_INTERVAL  # the head is on the disk at once
+        self._images = None if header.camera is None else KeptImages(path.with_name(KEYFRAMES))
         if past:
             self._file.truncate(past.length)
             self._file.seek(past.length)
         else:
             self._append(b"H" + json.dumps(asdict(header)).encode())
+
+    def keyframe(self, frame: Frame, seen: Observations | None, first_images: int) -> None:
+        """Record what a run in real time needs of a keyframe, before ``frame`` records its motion.
+
+        Args:
+            frame: its images.
+            seen: the landmarks that it saw.
+            first_images: checksum of the sequence's first images.
+        """
+        if not self._header.realtime or self.note is not None:
+            return
+        if self._images is not None:
+            self.note = self._images.keep(frame)
+        self._append(landmarks_record(seen, first_images if self._images is None else 0))
 
     def frame(self, state: FrameState) -> None:
         """Record a processed frame.
@@ -126,7 +170,7 @@ class Journal:
         Raises:
             JournalError: the journal has it otherwise.
         """
-        record = _frame_record(state)
+        record = frame_record(state)
         if not self._past:
             self._append(record)
         elif self._past.popleft() != record:
@@ -141,7 +185,7 @@ class Journal:
             if self._known:
                 self._known -= 1
             else:
-                self._append(b"V" + json.dumps(_plain(outcome), default=_number).encode())
+                self._append(outcome_record(outcome))
 
     def close(self) -> None:
         """Close the file."""
@@ -151,10 +195,11 @@ class Journal:
         if self.note is not None:
             return
         try:
-            whole = HEAD.pack(len(record), zlib.crc32(record)) + record
+            whole = framed(record)
             if self._file.write(whole) < len(whole):  # the disk took a part of it
                 raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-            if time.monotonic() - self._synced > SYNC_INTERVAL:
+            # A slow disk must not hold up frames that come by themselves; there the system writes when it likes.
+            if not self._header.realtime and time.monotonic() - self._synced > SYNC_INTERVAL:
                 os.fsync(self._file.fileno())
                 self._synced = time.monotonic()
         except OSError as error:
@@ -166,14 +211,14 @@ class RecallingVerifier:
 
     Args:
         inner: decides on what the journal does not hold.
-        known: outcomes by query and match, in order.
+        known: outcomes by query and match, in order; candidates that were left unverified in real time are decided now.
     """
 
     name: ClassVar[str] = "journal"
 
     def __init__(self, inner: LoopVerifier, known: dict[Pair, tuple[Verification, ...]]) -> None:
         self._inner = inner
-        self._known = {pair: list(outcomes) for pair, outcomes in known.items()}
+        self._known = {pair: [one for one in outcomes if not _was_shed(one)] for pair, outcomes in known.items()}
 
     @classmethod
     def from_config(cls, config: Config) -> Self:
@@ -198,82 +243,44 @@ def read_journal(path: Path) -> JournalContent:
         content = path.read_bytes()
     except OSError as error:
         raise ResultsError(f"There is nothing to resume: {path} cannot be read.") from error
+    try:
+        return _read(path, content)
+    except (AttributeError, KeyError, TypeError, ValueError) as error:
+        raise ResultsError(f"{path} is no journal of this version.") from error
+
+
+def _read(path: Path, content: bytes) -> JournalContent:
     frames: list[bytes] = []
+    landmarks: dict[int, bytes] = {}
     outcomes: defaultdict[Pair, list[Verification]] = defaultdict(list)
     header, length = None, 0
-    for record in _records(content):
+    for record in whole_records(content):
         length += HEAD.size + len(record)
-        kind, text = record[:1], record[1:]
+        kind = record[:1]
         if header is None:
-            header = _header(path, text)
+            header = _header(path, record[1:])
+        elif kind == b"L":
+            landmarks[len(frames)] = record
         elif kind == b"V":
-            outcome = _outcome(json.loads(text))
+            outcome = outcome_of(record)
             outcomes[outcome.candidate.query, outcome.candidate.match].append(outcome)
         else:
             frames.append(record)
     if header is None:
         raise ResultsError(f"There is nothing to resume: {path} is damaged from its beginning.")
-    return JournalContent(header, tuple(frames), {pair: tuple(some) for pair, some in outcomes.items()}, length)
-
-
-def _records(content: bytes) -> Iterator[bytes]:
-    """Whole records from the beginning; the first one that is cut short or damaged ends them."""
-    place = 0
-    while place + HEAD.size <= len(content):
-        length, checksum = HEAD.unpack_from(content, place)
-        record = content[place + HEAD.size : place + HEAD.size + length]
-        if len(record) < length or not length or zlib.crc32(record) != checksum:
-            return
-        yield record
-        place += HEAD.size + length
+    decided = {pair: tuple(some) for pair, some in outcomes.items()}
+    return JournalContent(header, tuple(frames), landmarks, decided, length)
 
 
 def _header(path: Path, text: bytes) -> JournalHeader:
-    try:
-        values = json.loads(text)
-        header = JournalHeader(**values | {"command": tuple(values["command"])})
-    except (KeyError, TypeError, ValueError) as error:
-        raise ResultsError(f"{path} is no journal of this version.") from error
+    values = json.loads(text)
+    header = JournalHeader(**values | {"command": tuple(values["command"])})
+    if not all(isinstance(value, str) for value in (header.config, header.source, *header.command)):
+        raise TypeError("no settings")
     if header.version != __version__:
         raise ResultsError(f"{path} was written by semslam {header.version}; only that version can go on with it.")
     return header
 
 
-def _frame_record(state: FrameState) -> bytes:
-    """What is known of a frame; the same motion gives the same bytes."""
-    motion = state.motion
-    head = {
-        "index": state.index,
-        "timestamp": state.timestamp,
-        "status": motion.status.value,
-        "map_id": motion.map_id,
-        "inliers": int(motion.inliers),
-        "keyframe": state.keyframe,
-    }
-    arrays = np.ascontiguousarray(motion.T_prev_cur), np.ascontiguousarray(motion.covariance)
-    return b"F" + json.dumps(head).encode() + b"\0" + b"".join(array.tobytes() for array in arrays)
-
-
-def _plain(outcome: Verification) -> dict[str, Any]:
-    """An outcome as JSON takes it; floats keep all their digits."""
-    values = asdict(outcome)
-    for name in ("T_match_query", "covariance", "shared"):
-        if values.get(name) is not None:
-            values[name] = np.asarray(values[name]).tolist()
-    return values
-
-
-def _number(value: Any) -> float | int:
-    """A number of numpy's as one of Python's."""
-    number: float | int = value.item()
-    return number
-
-
-def _outcome(values: dict[str, Any]) -> Verification:
-    """The reverse of ``_plain``."""
-    values = values | {"candidate": LoopCandidate.from_plain(values["candidate"])}
-    if "reason" in values:
-        return LoopRejection(**values | {"reason": RejectionReason(values["reason"])})
-    arrays = {name: np.array(values[name]) for name in ("T_match_query", "covariance")}
-    shared = None if values["shared"] is None else np.array(values["shared"], dtype=np.int64)
-    return LoopConstraint(**values | arrays | {"shared": shared})
+def _was_shed(outcome: Verification) -> bool:
+    return isinstance(outcome, LoopRejection) and outcome.reason is RejectionReason.SHED

@@ -4,6 +4,7 @@ from contextlib import closing
 
 from semslam.config import Config
 from semslam.datasets.dataset import Dataset
+from semslam.datasets.feed import Feed
 from semslam.loop.verification.verifier import build_verifier
 from semslam.runs.files import writing
 from semslam.runs.journal import JOURNAL, Journal, JournalContent, JournalHeader, RecallingVerifier
@@ -27,6 +28,7 @@ def run_journaled(
     past: JournalContent | None = None,
     recording: Recording | None = None,
     viewer: Viewer | None = None,
+    feed: Feed | None = None,
 ) -> RunResult:
     """Run, or replay a recording, with a journal beside the run folder, which stays there once a frame is in it.
 
@@ -40,6 +42,7 @@ def run_journaled(
         past: the journal of a run that is resumed.
         recording: motions that are repeated instead of tracked.
         viewer: shows the run while it is computed.
+        feed: hands out the frames in real time.
 
     Raises:
         SemslamError: as ``run`` and ``replay`` do.
@@ -55,5 +58,5 @@ def run_journaled(
 
     with closing(journal):
         if recording is None:
-            return run(dataset, config, keep, viewer, stop, journal, verifier)
+            return run(dataset, config, keep, viewer, stop, journal, verifier, feed)
         return replay(dataset, recording, config, keep, verifier, viewer, stop, journal)

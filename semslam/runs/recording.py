@@ -42,7 +42,7 @@ class Recording:
         frames: every frame the odometry was shown; landmarks are kept of keyframes alone.
         unreadable: the message of each frame that could not be read.
         interrupted: whether the run was stopped before the last frame.
-        checksum: of the first frame's images, by which the sequence is known again.
+        checksum: of the first frame's images, by which the sequence is known again; 0 = not known.
     """
 
     frames: tuple[RecordedFrame, ...]
@@ -61,7 +61,7 @@ class Recording:
             if frame.index >= len(stamps) or stamps[frame.index] != frame.timestamp:
                 raise DatasetError(f"{dataset.name} is not the sequence of the saved run: frame {frame.index} differs.")
         first = self.frames[0].index
-        if checksum(dataset.frame(first)) != self.checksum:
+        if self.checksum and checksum(dataset.frame(first)) != self.checksum:
             raise DatasetError(f"{dataset.name} is not the sequence of the saved run: image {first} differs.")
 
 

@@ -81,6 +81,8 @@ class Session:
                 self._latencies.begin(came)
                 state = self._slam.process(item)
                 self._latencies.done(state.keyframe)
+                if self._journal is not None and state.keyframe is not None:
+                    self._journal.keyframe(item, state.motion.observations, self._checksum)
                 self._show(state, item)
                 yield index, state
 

@@ -11,7 +11,7 @@ from semslam.datasets.cameras import TUM_DEPTH_SCALE, WRITTEN
 from semslam.datasets.dataset import Dataset
 from semslam.datasets.tum_format import write_trajectory
 from semslam.errors import DatasetError
-from semslam.types import UInt8Array
+from semslam.types import Float32Array, UInt8Array
 
 JPEG_QUALITY = 95
 DEEPEST = np.iinfo(np.uint16).max
@@ -45,9 +45,8 @@ def write_tum(
         for frame in dataset:
             stamp = f"{frame.timestamp:.9f}"
             color, depth = f"rgb/{stamp}.{'jpg' if jpeg else 'png'}", f"depth/{stamp}.png"
-            _write_image(folder / color, frame.color[..., ::-1])
-            units = np.rint(frame.depth.astype(np.float64) * TUM_DEPTH_SCALE)
-            _write_image(folder / depth, np.where(units <= DEEPEST, units, 0).astype(np.uint16))
+            write_color(folder / color, frame.color)
+            write_depth(folder / depth, frame.depth)
             if labels:
                 _write_image(folder / f"labels/{frame.index:06d}.png", labels(frame.index))
             lists["rgb"].append(f"{stamp} {color}")
@@ -62,8 +61,20 @@ def write_tum(
         write_trajectory(folder / "groundtruth.txt", dataset.ground_truth)
 
 
+def write_color(path: Path, color: UInt8Array) -> None:
+    """Write an RGB image (H, W, 3) in the format of the file's suffix."""
+    _write_image(path, color[..., ::-1])
+
+
+def write_depth(path: Path, depth: Float32Array) -> None:
+    """Write depth (H, W) in metres as a 16-bit PNG of 5000 a metre; what is deeper than 13.1 m is left out."""
+    units = np.rint(depth.astype(np.float64) * TUM_DEPTH_SCALE)
+    _write_image(path, np.where(units <= DEEPEST, units, 0).astype(np.uint16))
+
+
 def _write_image(path: Path, image: UInt8Array | np.ndarray[tuple[int, ...], np.dtype[np.uint16]]) -> None:
-    done, data = cv2.imencode(path.suffix, np.ascontiguousarray(image), [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
+    quality = [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY] if path.suffix == ".jpg" else []
+    done, data = cv2.imencode(path.suffix, np.ascontiguousarray(image), quality)
     if not done:
         raise DatasetError(f"The image {path} could not be encoded.")
     path.write_bytes(data.tobytes())
