@@ -29,3 +29,13 @@ def open_weights(path: Path, content: str) -> Iterator[Mapping[str, npt.NDArray[
         yield arrays
     except (ValueError, KeyError, AttributeError) as error:
         raise ModelError(f"{path} is no {content}, or it is damaged.") from error
+
+
+def load_min_score(path: Path, content: str) -> float:
+    """Read the score that 99 in 100 pairs of photos of different places stay below.
+
+    Raises:
+        ModelError: the file is missing or damaged.
+    """
+    with open_weights(path, content) as arrays:
+        return float(arrays["min_score"].astype(float))

@@ -7,7 +7,7 @@ import numpy as np
 
 from semslam.config import Config, LoopConfig, Section, setting
 from semslam.loop.detectors.common.backbone import Backbone
-from semslam.loop.detectors.common.weight_file import open_weights
+from semslam.loop.detectors.common.weight_file import load_min_score
 from semslam.loop.detectors.global_descriptor.descriptor import DescriptorDetector
 from semslam.types import Float32Array, KeyframeView, UInt8Array
 
@@ -60,7 +60,10 @@ class Conv3Detector(DescriptorDetector):
         """
         weights = config.section(cls.name, cls.Settings).alexnet
         if weights is None:
-            return cls(config.loops, EncoderMap(Backbone.from_config(config), load_min_score()))
+            return cls(
+                config.loops,
+                EncoderMap(Backbone.from_config(config), load_min_score(SHIPPED, "score of the encoder's map")),
+            )
         from semslam.loop.detectors.global_descriptor.alexnet import AlexNetMap
 
         return cls(config.loops, AlexNetMap.load(weights))
@@ -87,13 +90,3 @@ class EncoderMap:
     def __call__(self, color: UInt8Array) -> Float32Array:
         """(h / 16, w / 16, 320)."""
         return self._backbone.encode(color).high
-
-
-def load_min_score(path: Path = SHIPPED) -> float:
-    """Read the cosine that 99 in 100 pairs of photos of different places stay below.
-
-    Raises:
-        ModelError: the file is missing or damaged.
-    """
-    with open_weights(path, "score of the encoder's map") as arrays:
-        return float(arrays["min_score"].astype(float))

@@ -6,6 +6,8 @@ import pytest
 
 from semslam.config import Config
 from semslam.errors import ModelError
+from semslam.loop.detectors.common.weight_file import load_min_score
+from semslam.loop.detectors.global_descriptor import conv3
 from semslam.loop.detectors.global_descriptor.alexnet import AlexNetMap, build_network
 from semslam.loop.detectors.global_descriptor.cnnw import (
     count_words,
@@ -13,7 +15,6 @@ from semslam.loop.detectors.global_descriptor.cnnw import (
     train_channel_words,
     unit_channels,
 )
-from semslam.loop.detectors.global_descriptor.conv3 import load_min_score
 from semslam.loop.detectors.global_descriptor.gist import GistDetector
 from semslam.loop.detectors.global_descriptor.hog import HogDetector
 from semslam.loop.detectors.global_descriptor.thumbnail import ThumbnailDetector
@@ -75,9 +76,9 @@ def test_channel_words(tmp_path) -> None:
 
 
 def test_from_which_score_conv3_proposes_is_learned_with_the_encoder(tmp_path) -> None:
-    assert 0 < load_min_score() < 1
+    assert 0 < load_min_score(conv3.SHIPPED, "score") < 1
     with pytest.raises(ModelError, match="no score of the encoder's map"):
-        load_min_score(tmp_path / "none.npz")
+        load_min_score(tmp_path / "none.npz", "score of the encoder's map")
 
 
 def test_alexnet_is_asked_for_by_its_hash(tmp_path) -> None:

@@ -1,0 +1,1 @@
+"""A principal component analysis network."""

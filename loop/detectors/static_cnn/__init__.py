@@ -1,0 +1,1 @@
+"""Convolutional features of what does not move."""

@@ -1,0 +1,1 @@
+"""Convolutional features calibrated by semantics, aggregated over their nearest centres."""
