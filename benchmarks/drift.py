@@ -20,6 +20,7 @@ front end of the sequence. The list, for many detectors, has a line for each of 
 import argparse
 import csv
 import os
+import re
 import statistics
 import time
 from collections.abc import Hashable, Iterable, Iterator, Sequence
@@ -78,7 +79,7 @@ class Rendered:
 
 
 class Remembered:
-    """A verifier that looks at each pair of frames once; one with other matched nodes or prediction is another pair."""
+    """A verifier that looks at each pair of frames once; with other nodes, guess or prediction it is another pair."""
 
     def __init__(self, config: Config) -> None:
         self._verifier = IcpVerifier.from_config(config)
@@ -87,7 +88,7 @@ class Remembered:
     def verify(self, query: Keyframe, match: Keyframe, candidate: LoopCandidate) -> LoopConstraint | LoopRejection:
         """The verifier's outcome, stored from before for the same two frames."""
         prediction = None if candidate.prediction is None else candidate.prediction.tobytes()
-        key = (query.frame_index, match.frame_index, candidate.evidence.nodes, prediction)
+        key = (query.frame_index, match.frame_index, candidate.evidence.nodes, candidate.guess, prediction)
         if key not in self._known:
             self._known[key] = self._verifier.verify(query, match, candidate)
         return replace(self._known[key], candidate=candidate)
@@ -108,16 +109,16 @@ def measure_start(arguments: argparse.Namespace, task: tuple[str, int, bool]) ->
     sequence, start, once = task
     done = {key_of(row) for row in read_rows(arguments.folder / ROWS)}
     dataset, added = open_dataset(sequence), 0
-    name = dataset.name
+    name = label_of(sequence)
     if sequence.startswith("synthetic"):
-        dataset = Rendered(dataset, arguments.folder / "frames" / name)
+        dataset = Rendered(dataset, arguments.folder / "frames" / file_name(name))
     if start or arguments.max_frames:
         dataset = Selection(dataset, start, arguments.max_frames)
     verifier = Remembered(Config())
     odometries = [*listed(arguments.odometries), *(listed(arguments.once) if once else [])]
     for odometry in odometries:
         config = config_of(arguments, odometry, start)
-        kept = arguments.folder / f"{name}-{odometry}-{start}"
+        kept = arguments.folder / f"{file_name(name)}-{odometry}-{start}"
         for detector in listed(arguments.detectors):
             if (name, odometry, str(start), detector) in done:
                 continue
@@ -127,7 +128,7 @@ def measure_start(arguments: argparse.Namespace, task: tuple[str, int, bool]) ->
             result = replay(dataset, read_recording(kept), changed, verifier=verifier)
             if arguments.runs:
                 write_run(result, dataset, kept.with_name(f"{kept.name}-{detector}"), plots=False)
-            add_row(arguments.folder / ROWS, row_of(result.metrics, start), time.process_time() - spent)
+            add_row(arguments.folder / ROWS, row_of(result.metrics, name, start), time.process_time() - spent)
             added += 1
     return added
 
@@ -154,9 +155,19 @@ def record(dataset: Dataset, config: Config, directory: Path) -> None:
     print(f"recorded {directory.name}, {time.process_time() - spent:.0f} s", flush=True)
 
 
-def row_of(metrics: Metrics, start: int) -> Row:
+def label_of(sequence: str) -> str:
+    """A folder by its name, a rendered scene by all that was asked of it."""
+    return sequence if sequence.startswith("synthetic") else Path(sequence).name
+
+
+def file_name(label: str) -> str:
+    """The label with every character that a file's name should not have replaced."""
+    return re.sub(r"[^A-Za-z0-9_.-]", "-", label)
+
+
+def row_of(metrics: Metrics, name: str, start: int) -> Row:
     values: dict[str, object] = {
-        "sequence": metrics.sequence,
+        "sequence": name,
         "odometry": metrics.odometry,
         "start": start,
         "detector": metrics.detector,

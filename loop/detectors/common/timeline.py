@@ -13,12 +13,15 @@ class Timeline:
     Args:
         config: the gap in time, the number of candidates, the score they need.
         min_score: the score a candidate needs where the settings name none.
+
+    Attributes:
+        min_score: the score a candidate needs.
     """
 
     def __init__(self, config: LoopConfig, min_score: float) -> None:
         self._min_gap = config.min_gap
         self._max_candidates = config.max_candidates
-        self._min_score = min_score if config.min_score is None else config.min_score
+        self.min_score = min_score if config.min_score is None else config.min_score
         self._ids = GrowingArray(np.int64)
         self._stamps = GrowingArray(np.float64)
 
@@ -50,7 +53,7 @@ class Timeline:
             query: the newer keyframe.
             scores: (N,) in 0..1, one per remembered keyframe; 0 is never a candidate.
         """
-        return self._top(query, np.where(scores >= self._min_score, scores, 0.0))
+        return self._top(query, np.where(scores >= self.min_score, scores, 0.0))
 
     def nearest(self, query: Keyframe, scores: FloatArray) -> list[int]:
         """The same without the minimum score of a candidate."""

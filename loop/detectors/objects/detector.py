@@ -74,7 +74,10 @@ class ObjectsDetector(RememberingDetector[Submap]):
         if not len(self._timeline):
             return []
         submap = self._look(view)
-        matches = {at: match_submaps(submap, self._looks[at], self._config) for at in self._shortlist(view, submap)}
+        least = self._timeline.min_score
+        matches = {
+            at: match_submaps(submap, self._looks[at], self._config, least) for at in self._shortlist(view, submap)
+        }
         scores = np.zeros(len(self._timeline))
         for at, found in matches.items():
             scores[at] = 0.0 if found is None else found.score

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from semslam.geometry.se3 import Float32Array, FloatArray, invert, transform_points
-from semslam.geometry.voxels import VoxelTable, voxel_cells
+from semslam.geometry.voxels import voxel_cells, voxel_keys
 from semslam.loop.detector import Arrays
 from semslam.loop.detectors.objects.labelled import FIRST_THING, FLOOR, GROUP_COUNT, VOID, LabelledCloud
 from semslam.loop.detectors.objects.settings import ObjectsConfig
@@ -118,17 +118,15 @@ def build_submap(clouds: Sequence[LabelledCloud], config: ObjectsConfig) -> Subm
     points = transform_points(T_level_odom, np.concatenate([cloud.points for cloud in clouds])).astype(np.float32)
     normals = (np.concatenate([c.normals for c in clouds]) @ T_level_odom[:3, :3].T).astype(np.float32)
     labels = np.concatenate([cloud.groups for cloud in clouds])
-    table = VoxelTable(config.voxel)
-    rows = table.rows(points)
-    votes = np.bincount(rows * GROUP_COUNT + labels, minlength=len(table) * GROUP_COUNT)
-    votes = votes.reshape(-1, GROUP_COUNT)
+    keys, rows = np.unique(voxel_keys(points, config.voxel), return_inverse=True)
+    votes = np.bincount(rows * GROUP_COUNT + labels, minlength=len(keys) * GROUP_COUNT).reshape(-1, GROUP_COUNT)
     winners = np.where(votes[:, 1:].any(axis=1), votes[:, 1:].argmax(axis=1) + 1, VOID)
-    counts = np.bincount(rows, minlength=len(table))
-    centres = _sums(rows, points, len(table)) / np.maximum(counts, 1)[:, None]
-    facing = _unit_rows(_sums(rows, normals, len(table)))
+    counts = np.bincount(rows, minlength=len(keys))
+    centres = _sums(rows, points, len(keys)) / np.maximum(counts, 1)[:, None]
+    facing = _unit_rows(_sums(rows, normals, len(keys)))
     floor = _floor(centres, facing, winners)
     ground = -CAMERA_HEIGHT if np.isnan(floor) else floor
-    things = _objects(voxel_cells(table.keys), centres, winners, votes, rows, clouds, config)
+    things = _objects(voxel_cells(keys), centres, winners, votes, rows, clouds, config)
     return Submap(
         clouds[0].keyframe.timestamp,
         invert(newest.T_odom_cam) @ T_odom_level,

@@ -12,6 +12,8 @@ CONES = (30.0, 15.0, 8.0)
 """Degrees by which normals of level and of upright surfaces may be off, in one round after the other."""
 ENOUGH = 100
 """Points of floor that settle where to begin; the beginning counts as many in each round."""
+STRIDE = 4
+"""Every so many points are looked at."""
 
 
 def find_up(clouds: Sequence[LabelledCloud]) -> FloatArray:
@@ -23,8 +25,8 @@ def find_up(clouds: Sequence[LabelledCloud]) -> FloatArray:
     across: the smallest eigenvector of the sum of n n' over the upright less that over the level. Without any surface
     it stays as it is.
     """
-    normals = np.concatenate([cloud.normals for cloud in clouds]).astype(np.float64)
-    floor = np.concatenate([cloud.groups for cloud in clouds]) == FLOOR
+    normals = np.concatenate([cloud.normals[::STRIDE] for cloud in clouds]).astype(np.float64)
+    floor = np.concatenate([cloud.groups[::STRIDE] for cloud in clouds]) == FLOOR
     up = _unit(-np.mean([cloud.keyframe.T_odom_cam[:3, 1] for cloud in clouds], axis=0))
     if floor.sum() >= ENOUGH:
         up = _unit(np.median(normals[floor], axis=0))
