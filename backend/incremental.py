@@ -206,7 +206,7 @@ class IncrementalPoseGraph:
         self._estimate.update()
         fresh, self._fresh = self._fresh[: self._affordable], self._fresh[self._affordable :]
         for constraint in fresh:
-            if self._map_of[constraint.candidate.match] == self._map_of[constraint.candidate.query]:
+            if self._map_of[constraint.match] == self._map_of[constraint.query]:
                 edge = loop_edge(constraint).widened(self._loop_scale)
                 fits = self._estimate.admit(edge, _pair(constraint), self._config.max_residual)
             else:
@@ -297,4 +297,4 @@ class IncrementalPoseGraph:
 
 
 def _pair(constraint: LoopConstraint) -> Pair:
-    return constraint.candidate.match, constraint.candidate.query
+    return constraint.match, constraint.query

@@ -97,7 +97,7 @@ class PoseGraph:
         Raises:
             GraphError: a key is unknown, the pair is closed already, or a matrix is not usable.
         """
-        match, query = constraint.candidate.match, constraint.candidate.query
+        match, query = constraint.match, constraint.query
         self._require_pair(match, query)
         if (match, query) in self._loops:
             raise GraphError(f"The loop from {match} to {query} is in the graph already.")

@@ -227,7 +227,7 @@ def print_verified(dataset: Dataset, names: list[str], every: int) -> None:
                 proposed += 1
                 outcome = verifier.verify(*ends_of(candidate, keyframes), candidate)
                 if isinstance(outcome, LoopConstraint):
-                    good = is_accurate(outcome, poses, row)
+                    good = is_accurate(outcome, poses)
                     accepted, off, closed[row] = accepted + 1, off + (not good), closed[row] | good
                     wrong += not good and bool(truth.false_pairs[row, candidate.match])
             detector.add(view)
@@ -237,8 +237,8 @@ def print_verified(dataset: Dataset, names: list[str], every: int) -> None:
     print()
 
 
-def is_accurate(loop: LoopConstraint, poses: Transforms, row: int) -> bool:
-    error = invert(invert(poses[loop.candidate.match]) @ poses[row]) @ loop.T_match_query
+def is_accurate(loop: LoopConstraint, poses: Transforms) -> bool:
+    error = invert(invert(poses[loop.match]) @ poses[loop.query]) @ loop.T_match_query
     return bool(np.linalg.norm(error[:3, 3]) <= 0.20 and rotation_angle(error) <= np.radians(10))
 
 

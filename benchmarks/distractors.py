@@ -33,7 +33,7 @@ from semslam.loop.detector import LoopDetector, Remembering
 from semslam.loop.segmentation.build import build_segmenter
 from semslam.loop.verification.submaps import ends_of
 from semslam.loop.verification.verifier import LoopVerifier, build_verifier
-from semslam.types import FloatArray, Frame, Keyframe, KeyframeView, LoopCandidate, LoopConstraint, Transform
+from semslam.types import Frame, Keyframe, KeyframeView, LoopConstraint, Transform
 
 PAUSE = 1000.0
 """Seconds between two sequences."""
@@ -141,13 +141,13 @@ def ask(
         if isinstance(outcome, LoopConstraint):
             tally.verified_across += across
             tally.verified += not across
-            tally.false += not across and is_false(candidate, outcome.T_match_query, shots)
+            tally.false += not across and is_false(outcome, shots)
 
 
-def is_false(candidate: LoopCandidate, T_match_query: FloatArray, shots: Sequence[tuple[str, Transform]]) -> bool:
+def is_false(loop: LoopConstraint, shots: Sequence[tuple[str, Transform]]) -> bool:
     """Whether a loop within a place misses the true relative pose by much."""
-    true = invert(shots[candidate.match][1]) @ shots[candidate.query][1]
-    error = invert(true) @ T_match_query
+    true = invert(shots[loop.match][1]) @ shots[loop.query][1]
+    error = invert(true) @ loop.T_match_query
     far = float(np.linalg.norm(error[:3, 3])) > FALSE_METRES
     return far or float(np.degrees(rotation_angle(error))) > FALSE_DEGREES
 

@@ -130,7 +130,7 @@ def ask(name: str, scene: Scene, config: Config) -> Answers:
 
 def error_of(loop: LoopConstraint, poses: FloatArray) -> tuple[float, float]:
     """Metres and degrees by which a loop misses the true relative pose."""
-    error = invert(invert(poses[loop.candidate.match]) @ poses[loop.candidate.query]) @ loop.T_match_query
+    error = invert(invert(poses[loop.match]) @ poses[loop.query]) @ loop.T_match_query
     return float(np.linalg.norm(error[:3, 3])), float(np.degrees(rotation_angle(error)))
 
 

@@ -88,19 +88,19 @@ def run(path: str, every: int, config: Config, detector: LoopDetector, known: li
 
 def report(part: Part) -> None:
     """Print a sequence's figures."""
-    elsewhere = [loop for loop in part.loops if loop.candidate.match < part.first]
-    here = [loop for loop in part.loops if loop.candidate.match >= part.first]
+    elsewhere = [loop for loop in part.loops if loop.match < part.first]
+    here = [loop for loop in part.loops if loop.match >= part.first]
     errors, good, wrong = [], set(), len(elsewhere)
     squared = nees(
         np.array([error_of(part, loop) for loop in here]).reshape(-1, 4, 4),
         np.array([loop.covariance for loop in here]).reshape(-1, 6, 6),
     )
     for loop in here:
-        query, match = loop.candidate.query - part.first, loop.candidate.match - part.first
+        query, match = loop.query - part.first, loop.match - part.first
         E = error_of(part, loop)
         errors.append((float(np.linalg.norm(E[:3, 3])), float(np.degrees(rotation_angle(E)))))
         if errors[-1][0] <= POSE_TOLERANCE and errors[-1][1] <= ANGLE_TOLERANCE:
-            good.add(query)
+            good.add(loop.candidate.query - part.first)
         else:
             wrong += bool(part.truth.false_pairs[query, match])
     asked = set(np.flatnonzero(part.truth.true_pairs.any(1)).tolist())
@@ -140,8 +140,8 @@ def compare_kinds(part: Part, known: list[Keyframe], every: int) -> None:
 
 def ask_neighbours(part: Part) -> None:
     """Print how far loops lie from the nearest loop of neighbouring keyframes, by exact odometry between them."""
-    here = [loop for loop in part.loops if loop.candidate.match >= part.first]
-    ends = np.array([(loop.candidate.query, loop.candidate.match) for loop in here]) - part.first
+    here = [loop for loop in part.loops if loop.match >= part.first]
+    ends = np.array([(loop.query, loop.match) for loop in here]) - part.first
     gaps: dict[str, list[float]] = {"right": [], "off": [], "of a wrong place": []}
     alone = dict.fromkeys(gaps, 0)
     for loop, (query, match) in zip(here, ends, strict=True):
@@ -164,7 +164,7 @@ def ask_neighbours(part: Part) -> None:
 
 def error_of(part: Part, loop: LoopConstraint) -> FloatArray:
     """Motion (4, 4) from the true pose of a sequence's loop to the verified one."""
-    query, match = loop.candidate.query - part.first, loop.candidate.match - part.first
+    query, match = loop.query - part.first, loop.match - part.first
     return invert(invert(part.poses[match]) @ part.poses[query]) @ loop.T_match_query
 
 

@@ -33,6 +33,7 @@ class LoopFollower:
 
     def __init__(self, config: LoopConfig) -> None:
         self._config = config
+        self._odometry: list[Transform] = []
         self._poses: list[Transform] = []
         self._frames: list[int] = []  # which keyframe's map each pose is in: poses of different maps do not compare
         self._forgotten: set[int] = set()
@@ -43,6 +44,7 @@ class LoopFollower:
 
     def add(self, keyframe: Keyframe, before: Keyframe | None) -> None:
         """Take the newest keyframe, whose loops will be noted next, and the one before it."""
+        self._odometry.append(keyframe.T_odom_cam)
         if before is None or before.map_id != keyframe.map_id:
             self._following = False
             self._poses.append(keyframe.T_odom_cam)
@@ -62,8 +64,9 @@ class LoopFollower:
         self._tried.add(match)
         if isinstance(outcome, LoopConstraint):
             if not self._verified:
-                self._poses[-1] = self._poses[match] @ outcome.T_match_query
-                self._frames[-1] = self._frames[match]
+                moved = invert(self._odometry[outcome.query]) @ self._odometry[-1]
+                self._poses[-1] = self._poses[outcome.match] @ outcome.T_match_query @ moved
+                self._frames[-1] = self._frames[outcome.match]
             self._verified += 1
             self._following = True
 

@@ -20,20 +20,24 @@ class ClosedPlaces:
 
     def note(self, loop: LoopConstraint) -> None:
         """Take in a verified loop."""
-        self._matches.setdefault(loop.candidate.query, []).append(loop.candidate.match)
+        self._matches.setdefault(loop.query, []).append(loop.match)
+
+    def joins(self, query: int, match: int) -> bool:
+        """Whether a verified loop is between these two keyframes."""
+        return match in self._matches.get(query, ())
 
     def loops(self, query: int, match: int, keyframes: Sequence[Keyframe]) -> int:
         """How many verified loops join the neighbours of two keyframes; only keyframes of one map are neighbours.
 
         Args:
-            query: the newer keyframe, the newest so far.
+            query: the newer keyframe.
             match: the older one.
             keyframes: all so far; ``keyframes[i].id`` is i.
         """
         queries, matches = keyframes[query].map_id, keyframes[match].map_id
         return sum(
             abs(other - match) <= NEIGHBOURHOOD and keyframes[other].map_id == matches
-            for near in range(query - NEIGHBOURHOOD, query + 1)
+            for near in range(query - NEIGHBOURHOOD, query + NEIGHBOURHOOD + 1)
             for other in self._matches.get(near, ())
-            if keyframes[near].map_id == queries
+            if near < len(keyframes) and keyframes[near].map_id == queries
         )

@@ -12,6 +12,7 @@ from semslam.loop.memory import LoopMemory, without_content
 from semslam.loop.redundancy import ClosedPlaces
 from semslam.loop.segmentation.build import build_segmenter
 from semslam.loop.segmentation.segmenter import Segmenter
+from semslam.loop.verification.anchors import at_candidate
 from semslam.loop.verification.submaps import ends_of
 from semslam.loop.verification.verifier import LoopVerifier, build_verifier
 from semslam.plugins import load
@@ -116,7 +117,8 @@ class LoopSearch:
         """Look for a place without taking the keyframe in; arguments and result are those of ``search``."""
         candidates = self._detector.query(self._view(keyframe, frame, labels))
         known = [*self._keyframes, keyframe]
-        return [self._verifier.verify(*ends_of(candidate, known), candidate) for candidate in candidates]
+        outcomes = [self._verifier.verify(*ends_of(candidate, known), candidate) for candidate in candidates]
+        return [at_candidate(one, known) if isinstance(one, LoopConstraint) else one for one in outcomes]
 
     def forget(self, ids: Collection[int]) -> None:
         """Propose these keyframes no more, and free what was kept of them.
@@ -169,15 +171,20 @@ class LoopSearch:
         return KeyframeView(keyframe, frame.color, frame.depth, labels)
 
     def _verify(self, candidate: LoopCandidate) -> Verification:
-        already = self._closed.loops(candidate.query, candidate.match, self._keyframes)
-        if 0 < self._per_place <= already:
-            outcome: Verification = LoopRejection(candidate, RejectionReason.REDUNDANT, already, self._per_place)
-        else:
-            outcome = self._verified(candidate)
+        outcome = self._repeated(candidate, candidate.query, candidate.match) or self._verified(candidate)
+        if isinstance(outcome, LoopConstraint) and outcome.between is not None:
+            outcome = self._repeated(candidate, *outcome.between) or outcome
         self._follower.note(outcome)
         if isinstance(outcome, LoopConstraint):
             self._closed.note(outcome)
         return outcome
+
+    def _repeated(self, candidate: LoopCandidate, query: int, match: int) -> LoopRejection | None:
+        """The rejection of a candidate whose loop would repeat others."""
+        already = self._closed.loops(query, match, self._keyframes)
+        if not 0 < self._per_place <= already and not self._closed.joins(query, match):
+            return None
+        return LoopRejection(candidate, RejectionReason.REDUNDANT, already, max(self._per_place, 1))
 
     def _verified(self, candidate: LoopCandidate) -> Verification:
         query, match = ends_of(candidate, self._keyframes)

@@ -120,7 +120,7 @@ def loop_edge(constraint: LoopConstraint) -> Edge:
     Raises:
         GraphError: its pose or covariance is not usable.
     """
-    match, query = constraint.candidate.match, constraint.candidate.query
+    match, query = constraint.match, constraint.query
     what = f"The loop from {match} to {query}"
     T = checked_pose(constraint.T_match_query, what)
     return Edge(match, query, T, checked_covariance(constraint.covariance, what))

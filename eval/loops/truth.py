@@ -151,7 +151,7 @@ def judge_loops(
 def _judge(
     loop: LoopConstraint, keyframes: Sequence[Keyframe], truth: Trajectory, read_depth: DepthReader
 ) -> JudgedLoop | None:
-    pair = keyframes[loop.candidate.match], keyframes[loop.candidate.query]
+    pair = keyframes[loop.match], keyframes[loop.query]
     poses, covered = poses_at(truth, [keyframe.timestamp for keyframe in pair])
     if not covered.all():
         return None

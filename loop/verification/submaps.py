@@ -8,6 +8,7 @@ import numpy as np
 from semslam.config import SubmapConfig
 from semslam.geometry.se3 import FloatArray, invert, orthonormalise, rotation_angle, transform_points
 from semslam.geometry.voxels import voxel_keys
+from semslam.loop.verification.anchors import Anchors, choose_anchors
 from semslam.loop.verification.free_space import BoolArray, sight_of
 from semslam.loop.verification.gates import Gate, first_failed
 from semslam.loop.verification.registration import Fit, Surface, measure_fit, plane_information, refine
@@ -56,9 +57,11 @@ def merged_cloud(keyframe: Keyframe, voxel: float) -> Cloud:
 class SubmapRegistration:
     """From a guess between two submaps to a constraint: ICP on the merged clouds, coarse to fine, behind gates.
 
-    A constraint needs enough points, a registration that stays near the guess, an overlap that is large from both
-    sides, few points in space that any view of the other submap looked through, a small residual and a position that
-    is determined. Nothing in it compares appearance.
+    The submaps need enough points, a registration that stays near the guess, an overlap that is large from both sides,
+    and few points in space that any view of the other submap looked through. Of the keyframes in them, the two that
+    share most surface are then registered again with their neighbours alone, and the constraint is between these: a
+    submap is as straight as odometry was while it was seen. This needs to stay near the first registration, an overlap,
+    a small residual and a position that is determined. Nothing in it compares appearance.
     """
 
     def __init__(self, config: SubmapConfig) -> None:
@@ -76,16 +79,42 @@ class SubmapRegistration:
         T_guess = np.array(guess.T_match_query)
         source, target = Surface(ours), Surface(theirs)
         T = orthonormalise(refine(source, target, T_guess, config.distances))
-        fit = measure_fit(source, target, T, config.fit_distance)
         there, back = measure_fit(source, target, T, config.near), measure_fit(target, source, invert(T), config.near)
         overlap = min(there.fitness, back.fitness)
         filled = max(_free_space_share(ours, there, match, T), _free_space_share(theirs, back, query, invert(T)))
-        covariance = self._covariance(ours, theirs, T, fit)
-        gates = self._gates(invert(T_guess) @ T, fit, overlap, filled, covariance)
+        gates = (
+            self._stays(T_guess, T),
+            Gate(overlap >= config.min_overlap, RejectionReason.LOW_OVERLAP, overlap, config.min_overlap),
+            Gate(filled <= config.max_free_space, RejectionReason.FREE_SPACE, filled, config.max_free_space),
+        )
         failed = first_failed(gates)
         if failed is not None:
             return LoopRejection(candidate, failed.reason, failed.value, failed.limit)
-        figures = {gate.reason.value: gate.value for gate in gates}
+        figures = {f"submaps_{gate.reason.value}": gate.value for gate in gates}
+        return self._join(choose_anchors(query, match, T), candidate, figures)
+
+    def _join(
+        self, anchors: Anchors, candidate: LoopCandidate, figures: dict[str, float]
+    ) -> LoopConstraint | LoopRejection:
+        """Register the two keyframes that share most surface, with their neighbours."""
+        config = self._config
+        ours, theirs = (merged_cloud(end, config.voxel) for end in (anchors.query, anchors.match))
+        source, target = Surface(ours), Surface(theirs)
+        T = orthonormalise(refine(source, target, anchors.T_match_query, config.distances[1:]))
+        fit = measure_fit(source, target, T, config.fit_distance)
+        there, back = measure_fit(source, target, T, config.near), measure_fit(target, source, invert(T), config.near)
+        overlap = min(there.fitness, back.fitness)
+        covariance = self._covariance(ours, theirs, T, fit)
+        sigma = float(np.sqrt(np.linalg.eigvalsh(covariance[3:, 3:])[-1]))
+        gates = (
+            self._stays(anchors.T_match_query, T),
+            Gate(overlap >= config.min_view_overlap, RejectionReason.LOW_OVERLAP, overlap, config.min_view_overlap),
+            Gate(fit.rmse <= config.max_rmse, RejectionReason.HIGH_RMSE, fit.rmse, config.max_rmse),
+            Gate(sigma <= config.max_sigma, RejectionReason.DEGENERATE, sigma, config.max_sigma),
+        )
+        failed = first_failed(gates)
+        if failed is not None:
+            return LoopRejection(candidate, failed.reason, failed.value, failed.limit)
         return LoopConstraint(
             candidate,
             T,
@@ -95,23 +124,16 @@ class SubmapRegistration:
             overlap,
             len(candidate.evidence.objects),
             "submaps",
-            figures,
+            figures | {gate.reason.value: gate.value for gate in gates},
+            between=(anchors.query.id, anchors.match.id),
         )
 
-    def _gates(
-        self, change: FloatArray, fit: Fit, overlap: float, filled: float, covariance: FloatArray
-    ) -> tuple[Gate, ...]:
-        config = self._config
-        moved, turned = float(np.linalg.norm(change[:3, 3])), float(rotation_angle(change))
-        sigma = float(np.sqrt(np.linalg.eigvalsh(covariance[3:, 3:])[-1]))
-        stayed = moved <= config.max_shift and turned <= config.max_turn
-        return (
-            Gate(stayed, RejectionReason.FAR_FROM_GUESS, moved, config.max_shift),
-            Gate(overlap >= config.min_overlap, RejectionReason.LOW_OVERLAP, overlap, config.min_overlap),
-            Gate(filled <= config.max_free_space, RejectionReason.FREE_SPACE, filled, config.max_free_space),
-            Gate(fit.rmse <= config.max_rmse, RejectionReason.HIGH_RMSE, fit.rmse, config.max_rmse),
-            Gate(sigma <= config.max_sigma, RejectionReason.DEGENERATE, sigma, config.max_sigma),
-        )
+    def _stays(self, T_guess: FloatArray, T: FloatArray) -> Gate:
+        """Whether a registration stays near what it began with."""
+        change, config = invert(T_guess) @ T, self._config
+        moved = float(np.linalg.norm(change[:3, 3]))
+        stayed = moved <= config.max_shift and float(rotation_angle(change)) <= config.max_turn
+        return Gate(stayed, RejectionReason.FAR_FROM_GUESS, moved, config.max_shift)
 
     def _covariance(self, ours: Cloud, theirs: Cloud, T: FloatArray, fit: Fit) -> FloatArray:
         """Covariance (6, 6) of T: that of point-to-plane ICP, inflated, and what odometry leaves within submaps."""

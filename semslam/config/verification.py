@@ -19,6 +19,9 @@ class SubmapConfig(Section):
     min_points: int = setting(1500, "minimum number of points of each submap", gt=5)
     min_overlap: float = setting(0.3, "share of either submap that must lie near the other", ge=0, le=1)
     near: float = setting(0.1, "distance up to which a point counts as overlapping", unit="m", gt=0)
+    min_view_overlap: float = setting(
+        0.15, "the same of the two keyframes with their neighbours that a loop is between", ge=0, le=1
+    )
     max_free_space: float = setting(
         0.07, "points in the other's free space, as a share of these and the overlapping", ge=0, le=1
     )

@@ -55,10 +55,9 @@ def align_runs(first: SavedViews, second: SavedViews, progress: Progress = silen
         frame = replace(view.frame, timestamp=view.frame.timestamp + shift) if later else view.frame
         keyframe = builder.build_at(frame, view.T_world_cam, map_id=int(later))
         for outcome in search.search(keyframe, frame):
-            match = outcome.candidate.match
-            if later and match < len(first.keyframes) and isinstance(outcome, LoopConstraint):
-                T_second_query = view.T_world_cam
-                estimates.append(placed[match].T_world_cam @ outcome.T_match_query @ invert(T_second_query))
+            if later and isinstance(outcome, LoopConstraint) and outcome.match < len(first.keyframes):
+                T_first_query = placed[outcome.match].T_world_cam @ outcome.T_match_query
+                estimates.append(T_first_query @ invert(placed[outcome.query].T_world_cam))
         progress(done, len(placed))
     return _agreed(estimates)
 

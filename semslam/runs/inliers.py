@@ -57,5 +57,5 @@ def _pixels(loop: LoopConstraint, keyframes: Sequence[Keyframe]) -> FloatArray:
     if loop.shared is None or not len(loop.shared):
         return np.empty((0, 4))
     chosen = loop.shared[np.linspace(0, len(loop.shared) - 1, min(MOST, len(loop.shared))).round().astype(int)]
-    query, match = (keyframes[id].finest.pixels for id in (loop.candidate.query, loop.candidate.match))
+    query, match = (keyframes[id].finest.pixels for id in (loop.query, loop.match))
     return np.concatenate([query[chosen[:, 0]], match[chosen[:, 1]]], axis=1).astype(np.float64)

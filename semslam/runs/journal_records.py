@@ -102,7 +102,8 @@ def outcome_of(record: bytes) -> Verification:
         return LoopRejection(**values | {"reason": RejectionReason(values["reason"])})
     arrays = {name: np.array(values[name]) for name in ("T_match_query", "covariance")}
     shared = None if values["shared"] is None else np.array(values["shared"], dtype=np.int64)
-    return LoopConstraint(**values | arrays | {"shared": shared})
+    between = values["between"] and tuple(values["between"])
+    return LoopConstraint(**values | arrays | {"shared": shared, "between": between})
 
 
 def _split(record: bytes, kind: npt.DTypeLike) -> tuple[dict[str, Any], npt.NDArray[Any]]:

@@ -10,6 +10,7 @@ from semslam.types import (
     JudgedLoop,
     Keyframe,
     LedgerEntry,
+    LoopConstraint,
     LoopContribution,
     LoopOutcome,
     LoopRejection,
@@ -78,10 +79,11 @@ def _failed_test(verdict: LoopVerdict, config: BackendConfig) -> tuple[float | N
 
 def _identity(outcome: Verification, keyframes: Sequence[Keyframe]) -> Mapping[str, Any]:
     candidate = outcome.candidate
-    query, match = keyframes[candidate.query], keyframes[candidate.match]
+    joined = outcome if isinstance(outcome, LoopConstraint) else candidate
+    query, match = keyframes[joined.query], keyframes[joined.match]
     return {
-        "query": candidate.query,
-        "match": candidate.match,
+        "query": query.id,
+        "match": match.id,
         "query_frame": query.frame_index,
         "match_frame": match.frame_index,
         "query_time": query.timestamp,

@@ -92,7 +92,7 @@ def merge_settings(config: Config) -> Config:
 def joining_loops(merge: Merge, slam: SlamResult) -> int:
     """How many accepted loops join the sessions; without one they stay separate maps."""
     second = {keyframe.id for keyframe in slam.keyframes if keyframe.frame_index >= merge.boundary}
-    pairs = (verdict.constraint.candidate for verdict in slam.solution.verdicts if verdict.accepted)
+    pairs = (verdict.constraint for verdict in slam.solution.verdicts if verdict.accepted)
     return sum((pair.query in second) is not (pair.match in second) for pair in pairs)
 
 

@@ -67,14 +67,14 @@ class LoopFactors:
 
     def closure(self, constraint: LoopConstraint, keys: Sequence[int]) -> Closure:
         """A loop between keyframes as a factor; ``keys`` are the caller's, by keyframe."""
-        match_key, query_key = keys[constraint.candidate.match], keys[constraint.candidate.query]
+        match_key, query_key = keys[constraint.match], keys[constraint.query]
         edge = self._edge(constraint, match_key, query_key)
         noise = None if self.noise is None else self.noise(constraint)
         return Closure(match_key, query_key, between_factor(edge, self.kernel, noise), constraint)
 
     def match(self, constraint: LoopConstraint, keys: Sequence[int]) -> PlaceMatch:
         """A loop from images that are no keyframe."""
-        match_key = keys[constraint.candidate.match]
+        match_key = keys[constraint.match]
         edge = self._edge(constraint, match_key, match_key)
         return PlaceMatch(match_key, edge.T_from_to, edge.covariance, constraint)
 

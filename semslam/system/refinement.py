@@ -63,7 +63,7 @@ def _shared(solution: GraphSolution, keyframes: Sequence[Keyframe], config: Conf
     for verdict in solution.verdicts:
         loop = verdict.constraint
         if verdict.accepted and loop.shared is not None:
-            pairs.append(MatchedFeatures(loop.candidate.query, loop.candidate.match, loop.shared))
+            pairs.append(MatchedFeatures(loop.query, loop.match, loop.shared))
     for before, after in pairwise(keyframes):
         if before.map_id == after.map_id:
             rows = shared_features(after, before, config.verification, config.seed)

@@ -28,8 +28,8 @@ class ObjectPair:
 
     Attributes:
         label: name of the classes.
-        query_xyz: centroid in the query's camera frame, metres.
-        match_xyz: the same in the match's.
+        query_xyz: centroid in the camera frame of the candidate's query, metres.
+        match_xyz: the same in its match's.
     """
 
     label: str
@@ -123,7 +123,7 @@ class LoopConstraint:
 
     Attributes:
         candidate: what was verified.
-        T_match_query: (4, 4) pose of the query camera in the match camera.
+        T_match_query: (4, 4) pose of the ``query`` keyframe's camera in the ``match`` keyframe's.
         covariance: (6, 6) of T_match_query.
         fitness: share of the query's points that meet the match's surface, 0..1.
         inlier_rmse: metres, of those points.
@@ -132,6 +132,8 @@ class LoopConstraint:
         method: which estimate was kept, such as "pnp" or "icp".
         figures: what the steps on the way measured, by name.
         shared: (K, 2) int64 rows of the query's and of the match's ``finest`` features that agree, or None.
+        between: ids of the query and the match where the verification chose others than the candidate's, as of two
+            submaps those whose views have most in common.
     """
 
     candidate: LoopCandidate
@@ -144,6 +146,17 @@ class LoopConstraint:
     method: str
     figures: dict[str, float] = field(default_factory=dict)
     shared: IntArray | None = None
+    between: tuple[int, int] | None = None
+
+    @property
+    def query(self) -> int:
+        """Id of the newer keyframe that the pose joins."""
+        return self.candidate.query if self.between is None else self.between[0]
+
+    @property
+    def match(self) -> int:
+        """Id of the older one."""
+        return self.candidate.match if self.between is None else self.between[1]
 
 
 class RejectionReason(StrEnum):

@@ -7,6 +7,7 @@ import pytest
 
 from semslam.config import Config
 from semslam.geometry.se3 import FloatArray, exp_so3, invert, make_transform, rotation_angle
+from semslam.loop.verification.anchors import at_candidate
 from semslam.loop.verification.icp import IcpVerifier
 from semslam.loop.verification.submaps import ends_of, merged_cloud
 from semslam.testing.scenes import corner_view, empty
@@ -35,11 +36,16 @@ def verify(T_guess: FloatArray, views: list[Keyframe]) -> LoopConstraint | LoopR
 
 
 def test_a_guess_is_refined() -> None:
-    true = invert(POSES[1]) @ POSES[3]
-    outcome = verify(true @ make_transform(exp_so3([0.02, 0.06, -0.02]), [0.15, 0.05, -0.1]), keyframes())
+    true, views = invert(POSES[1]) @ POSES[3], keyframes()
+    outcome = verify(true @ make_transform(exp_so3([0.02, 0.06, -0.02]), [0.15, 0.05, -0.1]), views)
     assert isinstance(outcome, LoopConstraint), outcome
-    error = invert(true) @ outcome.T_match_query
+    assert (outcome.query, outcome.match) == outcome.between
+    assert outcome.query in (2, 3) and outcome.match in (0, 1)
+    error = invert(invert(POSES[outcome.match]) @ POSES[outcome.query]) @ outcome.T_match_query
     assert np.linalg.norm(error[:3, 3]) < 0.03
+    back = at_candidate(outcome, views)
+    assert (back.query, back.match) == (3, 1)
+    assert np.linalg.norm((invert(true) @ back.T_match_query)[:3, 3]) < 0.05
     assert np.degrees(rotation_angle(error)) < 1
     assert outcome.method == "submaps"
     assert np.linalg.eigvalsh(outcome.covariance).min() > 0
