@@ -39,13 +39,14 @@ class EveryOldOne:
 
 @dataclass
 class Standing:
-    """Confirms every candidate: the camera has not moved."""
+    """Confirms every candidate, between other keyframes where ``between`` is set: the camera has not moved."""
 
     asked: list[LoopCandidate] = field(default_factory=list)
+    between: tuple[int, int] | None = None
 
     def verify(self, query: Keyframe, match: Keyframe, candidate: LoopCandidate) -> LoopConstraint:
         self.asked.append(candidate)
-        return LoopConstraint(candidate, np.eye(4), np.eye(6), 1.0, 0.0, 1.0, 50, "exact")
+        return LoopConstraint(candidate, np.eye(4), np.eye(6), 1.0, 0.0, 1.0, 50, "exact", between=self.between)
 
 
 def keyframe(number: int, map_id: int = 0) -> Keyframe:
@@ -56,8 +57,10 @@ def keyframe(number: int, map_id: int = 0) -> Keyframe:
     return Keyframe(number, number, float(number), np.eye(4), map_id, CAMERA, features, cloud)
 
 
-def search(config: LoopConfig, maps: list[int]) -> tuple[Standing, list[list[LoopConstraint | LoopRejection]]]:
-    verifier = Standing()
+def search(
+    config: LoopConfig, maps: list[int], between: tuple[int, int] | None = None
+) -> tuple[Standing, list[list[LoopConstraint | LoopRejection]]]:
+    verifier = Standing(between=between)
     search = LoopSearch(EveryOldOne(), None, verifier, config)  # type: ignore[arg-type]
     images = np.zeros((48, 64, 3), np.uint8), np.zeros((48, 64), np.float32)
     found = [
@@ -97,3 +100,13 @@ def test_later_candidates_are_verified_with_a_prediction_that_the_outcome_does_n
     verifier, found = search(LoopConfig(follow=0, per_place=2), [0] * (FIRST + 1))
     assert [candidate.prediction is None for candidate in verifier.asked] == [True] + [False] * 6
     assert all(outcome.candidate.prediction is None for outcome in found[FIRST])
+
+
+def test_no_two_loops_are_between_the_same_keyframes_though_their_candidates_differ() -> None:
+    for per_place in (0, 4):
+        verifier, found = search(LoopConfig(follow=3, per_place=per_place), [0] * (FIRST + 2), between=(8, 2))
+        loops = [one for outcomes in found for one in outcomes if isinstance(one, LoopConstraint)]
+        assert [(loop.query, loop.match) for loop in loops] == [(8, 2)]
+        assert len(verifier.asked) > 1
+        rejected = [one for outcomes in found for one in outcomes if isinstance(one, LoopRejection)]
+        assert {one.reason for one in rejected} == {RejectionReason.REDUNDANT}
