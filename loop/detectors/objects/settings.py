@@ -21,8 +21,9 @@ class ObjectsConfig(Section):
     tolerance: float = setting(0.3, "standard deviation of matched objects' distance", unit="m", gt=0)
     wall_tolerance: float = setting(0.12, "standard deviation of matched walls' distance", unit="m", gt=0)
     use_labels: bool = setting(
-        True, "compare classes in the match; objects are cut, and submaps shortlisted, by classes in any case"
+        True, "cut and compare objects by their classes; without, objects are what lies on no wall, floor or ceiling"
     )
     use_look: bool = setting(True, "compare how objects look")
     use_structure: bool = setting(True, "match walls too")
+    use_up: bool = setting(True, "find up by the floor and other surfaces; without, cameras are taken to be level")
     min_score: float = setting(0.25, "share of matched objects and walls that makes a candidate", ge=0, le=1)

@@ -12,7 +12,7 @@ from semslam.geometry.voxels import voxel_cells, voxel_keys
 from semslam.loop.detector import Arrays
 from semslam.loop.detectors.objects.labelled import FIRST_THING, FLOOR, GROUP_COUNT, VOID, LabelledCloud
 from semslam.loop.detectors.objects.settings import ObjectsConfig
-from semslam.loop.detectors.objects.upright import find_up, level_frame
+from semslam.loop.detectors.objects.upright import camera_up, find_up, level_frame
 from semslam.loop.detectors.objects.walls import Walls, azimuths, find_walls
 from semslam.types import IntArray, UInt8Array
 
@@ -23,6 +23,8 @@ CAMERA_HEIGHT = 1.4
 """Metres that the camera is taken to be above a floor that was not seen."""
 THING_COLUMNS = ("centroids", "extents", "sizes", "groups", "classes", "looks")
 WALL_COLUMNS = ("azimuths", "offsets", "starts", "ends", "areas")
+CEILING_HEIGHT = 0.9
+"""Metres above the camera from which on, without labels, everything is ceiling."""
 LEVEL = 0.9
 """Least vertical component of a level surface's normal."""
 
@@ -113,7 +115,7 @@ def build_submap(clouds: Sequence[LabelledCloud], config: ObjectsConfig) -> Subm
         config: sizes and limits.
     """
     newest = clouds[-1].keyframe
-    T_odom_level = level_frame(newest.T_odom_cam, find_up(clouds))
+    T_odom_level = level_frame(newest.T_odom_cam, find_up(clouds) if config.use_up else camera_up(clouds))
     T_level_odom = invert(T_odom_level)
     points = transform_points(T_level_odom, np.concatenate([cloud.points for cloud in clouds])).astype(np.float32)
     normals = (np.concatenate([c.normals for c in clouds]) @ T_level_odom[:3, :3].T).astype(np.float32)
@@ -124,6 +126,10 @@ def build_submap(clouds: Sequence[LabelledCloud], config: ObjectsConfig) -> Subm
     counts = np.bincount(rows, minlength=len(keys))
     centres = _sums(rows, points, len(keys)) / np.maximum(counts, 1)[:, None]
     facing = _unit_rows(_sums(rows, normals, len(keys)))
+    walls = find_walls(centres, facing, config)
+    if not config.use_labels:
+        winners = _unlabelled(centres, facing, walls, config.voxel)
+        votes = np.eye(GROUP_COUNT, dtype=np.int64)[winners]
     floor = _floor(centres, facing, winners)
     ground = -CAMERA_HEIGHT if np.isnan(floor) else floor
     things = _objects(voxel_cells(keys), centres, winners, votes, rows, clouds, config)
@@ -132,10 +138,24 @@ def build_submap(clouds: Sequence[LabelledCloud], config: ObjectsConfig) -> Subm
         invert(newest.T_odom_cam) @ T_odom_level,
         floor,
         things,
-        find_walls(centres, facing, config),
+        walls,
         azimuths(facing, winners, GROUP_COUNT),
         _content(things, ground),
     )
+
+
+def _unlabelled(centres: FloatArray, facing: FloatArray, walls: Walls, voxel: float) -> IntArray:
+    """Group of each voxel without its labels: what lies on no wall, floor or ceiling is a thing, all of one group."""
+    near = 1.5 * voxel
+    heights = centres[np.abs(facing[:, 2]) > LEVEL, 2]
+    structure = np.zeros(len(centres), dtype=bool)
+    if len(heights):
+        structure |= (centres[:, 2] < np.quantile(heights, 0.02) + near) | (centres[:, 2] > CEILING_HEIGHT)
+    for azimuth, offset, start, end in zip(walls.azimuths, walls.offsets, walls.starts, walls.ends, strict=True):
+        across = centres[:, 0] * np.cos(azimuth) + centres[:, 1] * np.sin(azimuth) - offset
+        along = centres[:, 1] * np.cos(azimuth) - centres[:, 0] * np.sin(azimuth)
+        structure |= (np.abs(across) < near) & (along > start - near) & (along < end + near)
+    return np.where(structure, VOID, FIRST_THING)
 
 
 def _floor(centres: FloatArray, facing: FloatArray, winners: IntArray) -> float:

@@ -27,7 +27,7 @@ def find_up(clouds: Sequence[LabelledCloud]) -> FloatArray:
     """
     normals = np.concatenate([cloud.normals[::STRIDE] for cloud in clouds]).astype(np.float64)
     floor = np.concatenate([cloud.groups[::STRIDE] for cloud in clouds]) == FLOOR
-    up = _unit(-np.mean([cloud.keyframe.T_odom_cam[:3, 1] for cloud in clouds], axis=0))
+    up = camera_up(clouds)
     if floor.sum() >= ENOUGH:
         up = _unit(np.median(normals[floor], axis=0))
     for cone in CONES:
@@ -36,6 +36,11 @@ def find_up(clouds: Sequence[LabelledCloud]) -> FloatArray:
         _, vectors = np.linalg.eigh(upright.T @ upright - level.T @ level - ENOUGH * np.outer(up, up))
         up = vectors[:, 0] * np.sign(vectors[:, 0] @ up)
     return np.asarray(up)
+
+
+def camera_up(clouds: Sequence[LabelledCloud]) -> FloatArray:
+    """Mean (3,) of the cameras' upward axes in odometry's frame."""
+    return _unit(-np.mean([cloud.keyframe.T_odom_cam[:3, 1] for cloud in clouds], axis=0))
 
 
 def level_frame(T_odom_cam: FloatArray, up: FloatArray) -> FloatArray:

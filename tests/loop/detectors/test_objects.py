@@ -41,9 +41,9 @@ def views() -> list[KeyframeView]:
     return views
 
 
-def submap_of(views: list[KeyframeView]) -> Submap:
+def submap_of(views: list[KeyframeView], config: ObjectsConfig = CONFIG) -> Submap:
     looks = np.ones((4, 3), dtype=np.float32)
-    return build_submap([label_cloud(view, looks, (2, 2), 5.0, 0.0) for view in views], CONFIG)
+    return build_submap([label_cloud(view, looks, (2, 2), 5.0, 0.0) for view in views], config)
 
 
 def test_up_is_that_of_the_room(views: list[KeyframeView]) -> None:
@@ -175,3 +175,11 @@ def test_a_damaged_submap_is_refused() -> None:
     del arrays["content"]
     with pytest.raises(KeyError):
         Submap.from_arrays(arrays)
+
+
+def test_without_labels_things_are_what_is_no_structure(views: list[KeyframeView]) -> None:
+    bare = CONFIG.model_copy(update={"use_labels": False})
+    submap = submap_of(views, bare)
+    assert 0 < len(submap.objects) < len(submap_of(views).objects)
+    assert len(set(submap.objects.groups.tolist())) == 1
+    assert match_submaps(submap, submap_of(views[:9], bare), bare) is not None
