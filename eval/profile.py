@@ -7,7 +7,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from semslam.eval.style import PLAIN, SERIES, PictureSettings, render
+from semslam.eval.looks import SERIES
+from semslam.eval.style import PLAIN, PictureSettings, render
 from semslam.types import FloatArray
 
 Calls = FloatArray

@@ -10,8 +10,9 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.figure import Figure
 
+from semslam.eval.looks import SERIES
 from semslam.eval.loops.truth import LoopTruth
-from semslam.eval.style import PLAIN, SERIES, PictureSettings, render
+from semslam.eval.style import PLAIN, PictureSettings, render
 from semslam.eval.trajectory import BoolArray
 from semslam.geometry.se3 import FloatArray
 from semslam.types import KeyframeView, LoopCandidate

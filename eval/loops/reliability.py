@@ -6,8 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.figure import Figure
 
+from semslam.eval.looks import OPTIMISED, TRUTH
 from semslam.eval.loops.truth import LoopTruth
-from semslam.eval.style import OPTIMISED, PLAIN, TRUTH, PictureSettings, render
+from semslam.eval.style import PLAIN, PictureSettings, render
 from semslam.eval.trajectory import BoolArray
 from semslam.geometry.se3 import FloatArray
 

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from semslam.eval.looks import LOOKS, look_of
 from semslam.eval.report.curves import dash_of, numbers
 from semslam.eval.report.drawing import RunDrawing, loop_ends, paths, plane
-from semslam.eval.style import LOOKS, look_of
 from semslam.geometry.se3 import rotation_angle
 from semslam.types import FloatArray, LedgerEntry
 

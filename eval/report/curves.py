@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from semslam.eval.looks import LineStyle, Stroke
 from semslam.eval.report.drawing import AXES, ErrorCurve, Path, broken, plane
-from semslam.eval.style import LineStyle, Stroke
 from semslam.geometry.se3 import FloatArray
 
 MAX_POINTS = 4000

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from semslam.errors import TrajectoryError
-from semslam.eval.style import ODOMETRY, OPTIMISED, TRUTH, Stroke
+from semslam.eval.looks import ODOMETRY, OPTIMISED, TRUTH, Stroke
 from semslam.eval.trajectory import align, position_errors
 from semslam.geometry.se3 import FloatArray
 from semslam.types import LedgerEntry, Trajectory

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from semslam.eval.style import ACCEPTED, FALSE, INACCURATE, REJECTED, SKIPPED, TRUE, WITHDRAWN, look_of
+from semslam.eval.looks import ACCEPTED, FALSE, INACCURATE, REJECTED, SKIPPED, TRUE, WITHDRAWN, look_of
 from semslam.types import LedgerEntry, UInt8Array
 
 BUDGET = 6_000_000

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 
 from matplotlib.figure import Figure
 
-from semslam.eval.style import ODOMETRY, OPTIMISED, TRUTH, render
+from semslam.eval.looks import ODOMETRY, OPTIMISED, TRUTH
+from semslam.eval.style import render
 
 ROW_INCHES, MARGIN_INCHES, WIDTH_INCHES = 0.27, 0.75, 8.5
 

@@ -8,9 +8,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from semslam.errors import TrajectoryError
+from semslam.eval.looks import SERIES, TRUTH
 from semslam.eval.report.drawing import AXES, ErrorCurve, Path, broken, plane
 from semslam.eval.report.plots import view_size
-from semslam.eval.style import PLAIN, SERIES, TRUTH, PictureSettings, legend_below, render
+from semslam.eval.style import PLAIN, PictureSettings, legend_below, render
 from semslam.eval.trajectory import align, position_errors
 from semslam.types import Trajectory
 

@@ -8,8 +8,9 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
+from semslam.eval.looks import FALSE, REJECTED, SKIPPED, by_look
 from semslam.eval.report.drawing import AXES, RunDrawing, aligned, broken, error_curves, loop_ends, paths, plane
-from semslam.eval.style import FALSE, PLAIN, REJECTED, SKIPPED, PictureSettings, by_look, legend_below, render
+from semslam.eval.style import PLAIN, PictureSettings, legend_below, render
 from semslam.geometry.se3 import FloatArray
 from semslam.types import Trajectory
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
-from semslam.eval.style import FALSE, INACCURATE, TRUE, by_look
+from semslam.eval.looks import FALSE, INACCURATE, TRUE, by_look
 from semslam.types import LedgerEntry, LoopOutcome
 
 NOTICEABLE = 0.01

@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 
 from semslam.errors import ConfigError, TrajectoryError
+from semslam.eval.looks import LOOKS, SERIES, by_look
 from semslam.eval.loops.reliability import ScoreBin, draw_reliability
 from semslam.eval.report.drawing import RunDrawing
 from semslam.eval.report.overlay import NamedTrajectory, draw_comparison
 from semslam.eval.report.plots import draw_run
-from semslam.eval.style import DPI, LOOKS, SERIES, PictureFormat, PictureSettings, by_look
+from semslam.eval.style import DPI, PictureFormat, PictureSettings
 from semslam.types import LedgerEntry
 from tests.eval.report.ledgers import ALL_KINDS
 from tests.eval.report.samples import EMPTY, RUN, circle
