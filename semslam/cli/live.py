@@ -9,7 +9,7 @@ import typer
 from semslam.cli import options
 from semslam.cli.command import Command, example
 from semslam.cli.running import Task, carry_out, end, show
-from semslam.cli.runs import OutDirectory, RerunFile, Visualize, WithProfile, viewer_for
+from semslam.cli.runs import OutDirectory, RerunFile, Visualize, WithProfile, viewing
 from semslam.runtime.stopping import stop_on_signals
 
 SOURCE = "realsense"
@@ -48,12 +48,9 @@ def live_command(
         reservation = reserved(out_directory)
     source = SOURCE if recording is None else str(recording)
     with stop_on_signals() as stop:
-        with reservation as place:
-            viewer = viewer_for(place.directory.name, rerun_file, visualize)
+        with reservation as place, viewing(place.directory.name, rerun_file, visualize) as viewer:
             task = Task(camera, chosen, source, plots, sys.argv, viewer=viewer, feed=camera, once=True, profile=profile)
             done = carry_out(task, place, stop)
-        if viewer is not None:
-            viewer.close()
         if out_directory is None:
             link_latest(options.RUNS, done.directory)
         show(done, task)

@@ -1,6 +1,9 @@
 """semslam run."""
 
 import sys
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -113,12 +116,12 @@ def run_command(
         reservation = reserved(out_directory, frames)
     with stop_on_signals() as stop:
         with reservation as place:
-            viewer = viewer_for(place.directory.name, rerun_file, visualize)
             feed = RealTimeFeed(dataset, rate) if realtime else None
-            task = Task(dataset, chosen, source, plots, sys.argv, saved_run, recording, viewer, feed, profile=profile)
-            done = carry_out(task, place, stop)
-        if viewer is not None:
-            viewer.close()
+            with viewing(place.directory.name, rerun_file, visualize) as viewer:
+                task = Task(
+                    dataset, chosen, source, plots, sys.argv, saved_run, recording, viewer, feed, profile=profile
+                )
+                done = carry_out(task, place, stop)
         if out_directory is None:
             link_latest(options.RUNS, done.directory)
         show(done, task, as_json)
@@ -149,13 +152,23 @@ def _resume(directory: Path, sequence: str | None, as_json: bool) -> None:
         end(done, task, stop)
 
 
-def viewer_for(name: str, file: Path | None, live: bool) -> "Viewer | None":
-    """The viewer that is asked for; opened before the run, so that what is missing is known at once."""
-    if file is None and not live:
-        return None
-    from semslam.viewers.rerun_stream import open_viewer
+@contextmanager
+def viewing(name: str, file: Path | None, live: bool) -> Iterator["Viewer | None"]:
+    """The viewer that is asked for, closed after the run; what it lacks is known before the run.
 
-    return open_viewer(name, file, live)
+    Raises:
+        ConfigError: the viewer is not installed.
+        ResultsError: the recording cannot be written.
+    """
+    if file is None and not live:
+        yield None
+        return
+    from semslam.viewers.background import BackgroundViewer
+    from semslam.viewers.rerun_stream import check_place, open_viewer
+
+    check_place(file)
+    with closing(BackgroundViewer(partial(open_viewer, name, file, live), remark)) as viewer:
+        yield viewer
 
 
 def _source(sequence: str | None, saved: "SavedFrontEnd | None") -> str:

@@ -1,5 +1,6 @@
 """Opening a Rerun recording: into a file, into a viewer that is started, or both."""
 
+from importlib.util import find_spec
 from pathlib import Path
 
 from semslam.errors import ConfigError, ResultsError
@@ -7,6 +8,24 @@ from semslam.viewers.rerun_blueprint import make_blueprint
 from semslam.viewers.rerun_viewer import RerunViewer
 
 APPLICATION = "semslam"
+MISSING = "The viewer needs the package rerun-sdk: pip install 'semslam[rerun]'."
+
+
+def check_place(file: Path | None) -> None:
+    """Check before a run that it can be shown, without loading Rerun.
+
+    Raises:
+        ConfigError: rerun-sdk is not installed.
+        ResultsError: the recording cannot be written.
+    """
+    if find_spec("rerun") is None:
+        raise ConfigError(MISSING)
+    if file is not None:
+        try:
+            file.parent.mkdir(parents=True, exist_ok=True)
+            file.touch()
+        except (OSError, ValueError) as error:
+            raise ResultsError(f"{file} cannot be written: {' '.join(str(error).split())}.") from error
 
 
 def open_viewer(
@@ -28,7 +47,7 @@ def open_viewer(
     try:
         import rerun as rr
     except ImportError as error:
-        raise ConfigError("The viewer needs the package rerun-sdk: pip install 'semslam[rerun]'.") from error
+        raise ConfigError(MISSING) from error
     stream = rr.RecordingStream(APPLICATION)
     sinks: list[rr.FileSink | rr.GrpcSink] = []
     try:

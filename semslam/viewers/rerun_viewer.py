@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, cast
 import cv2
 import numpy as np
 
-from semslam.eval.style import ACCEPTED, ODOMETRY, OPTIMISED, OUTCOMES, REJECTED, TRUTH
+from semslam.eval.looks import ACCEPTED, ODOMETRY, OPTIMISED, OUTCOMES, REJECTED, TRUTH
 from semslam.geometry.se3 import Points3, rotations_to_quaternions, transform_points
 from semslam.loop.detectors.semantic.nodes import extract_nodes
 from semslam.loop.detectors.semantic.settings import NodeConfig
@@ -28,7 +28,7 @@ from semslam.viewers.viewer import FinishedRun, KeyframeScene, LoopScene, ShownL
 if TYPE_CHECKING:
     from rerun import RecordingStream
 
-JPEG_QUALITY = 75
+JPEG = [cv2.IMWRITE_JPEG_QUALITY, 75]
 IMAGE_INTERVAL = 0.09
 """Seconds between two colour images that are shown: ten a second; compressing them is most of a viewer's work."""
 PNG_FAST = [cv2.IMWRITE_PNG_COMPRESSION, 1, cv2.IMWRITE_PNG_FILTER, cv2.IMWRITE_PNG_FILTER_NONE]
@@ -80,7 +80,8 @@ class RerunViewer:
         if frame is not None and (state.keyframe is not None or state.timestamp >= self._next_image):
             self._next_image = state.timestamp + IMAGE_INTERVAL
             self._show_camera(frame.intrinsics)
-            self._stream.log(f"{IMAGE}/color", rr.Image(frame.color).compress(jpeg_quality=JPEG_QUALITY))
+            jpeg = cv2.imencode(".jpg", cv2.cvtColor(frame.color, cv2.COLOR_RGB2BGR), JPEG)[1].tobytes()
+            self._stream.log(f"{IMAGE}/color", rr.EncodedImage(contents=jpeg, media_type="image/jpeg"))
 
     def keyframe(self, scene: KeyframeScene) -> None:
         """See ``Viewer``."""
