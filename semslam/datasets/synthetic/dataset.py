@@ -37,6 +37,7 @@ class Request(Section):
     """What may stand behind the question mark."""
 
     seed: int = Field(0, ge=0, description="seed of textures, small things, sway and noise")
+    hand: int | None = Field(None, ge=0, description="seed of sway and noise where it is another: a walk of its own")
     frames: int = Field(0, ge=0, description="maximum number of frames; 0 = the whole way")
     rate: float = Field(10.0, gt=0, le=1000, description="frames a second")
     width: int = Field(320, ge=64, le=4096, multiple_of=4, description="pixels; the height is three quarters of it")
@@ -66,6 +67,11 @@ class Request(Section):
         if sensor not in DEPTH_SENSORS:
             raise ValueError(f"'{sensor}' is none of {', '.join(DEPTH_SENSORS)}")
         return sensor
+
+    @property
+    def hand_seed(self) -> int:
+        """Seed of sway and noise."""
+        return self.seed if self.hand is None else self.hand
 
     @classmethod
     def parse(cls, query: str) -> Self:
@@ -174,7 +180,7 @@ class SyntheticDataset:
     def _rendered(self, index: int) -> Frame:
         view = self.view(index)
         if self._request.noise:
-            rng = np.random.default_rng([self._request.seed, 2, index])
+            rng = np.random.default_rng([self._request.hand_seed, 2, index])
             sense_depth = DEPTH_SENSORS[self._request.sensor]
             color, depth = sense_color(view.color, rng), sense_depth(view, self.intrinsics.fx, rng)
         else:
@@ -230,7 +236,7 @@ class SyntheticDataset:
     def _way(self) -> Way:
         request, plan = self._request, PLANS[self._scene]
         route = plan.back if request.way == "back" else plan.route
-        return Way(route, request.seed, request.offset, request.sway)
+        return Way(route, request.hand_seed, request.offset, request.sway)
 
     @cached_property
     def _walk(self) -> Walk:

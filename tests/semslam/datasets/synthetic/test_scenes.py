@@ -210,6 +210,13 @@ def test_what_cannot_be_rendered_is_one_sentence(path: str, message: str) -> Non
         open_dataset(path)
 
 
+def test_another_hand_records_the_same_scene() -> None:
+    first, second = room(frames=2), room(frames=2, hand=1)
+    assert not np.array_equal(first.ground_truth.poses, second.ground_truth.poses)
+    np.testing.assert_allclose(first.ground_truth.poses, second.ground_truth.poses, atol=0.1)
+    assert digest(first.frame(1)) == digest(room(frames=2, hand=0).frame(1)) != digest(second.frame(1))
+
+
 def test_frames_limits_the_length() -> None:
     assert len(room(frames=5)) == 5
     assert room(frames=5).timestamps == room().timestamps[:5]
