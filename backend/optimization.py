@@ -156,7 +156,7 @@ def _screen(
     if strategy.accepts_all or config.drift_slack == 0:
         return Screening(np.zeros(len(loops)), (None,) * len(loops))
     chain = OdometryChain(problem.poses, odometry)
-    return screen_loops(chain, loops, config.max_residual, config.drift_slack)
+    return screen_loops(chain, loops, config.max_residual, config.drift_slack, config.joining_loops)
 
 
 def _trusted(

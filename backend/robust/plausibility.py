@@ -15,6 +15,7 @@ from semslam.backend.graph.chain import BoolArray, OdometryChain, deviations, sq
 from semslam.backend.graph.components import connected
 from semslam.backend.graph.products import Edge
 from semslam.backend.robust.calibration import cycles
+from semslam.backend.robust.support import unsupported
 from semslam.geometry.se3 import invert
 from semslam.types import FloatArray, IntArray, RejectionReason
 
@@ -53,16 +54,19 @@ class Screening:
         return np.array([reason is None for reason in self.reasons], dtype=bool)
 
 
-def screen_loops(chain: OdometryChain, loops: Sequence[Edge], max_residual: float, slack: float) -> Screening:
+def screen_loops(
+    chain: OdometryChain, loops: Sequence[Edge], max_residual: float, slack: float, support: int = 1
+) -> Screening:
     """Hold back loops that odometry contradicts, and groups of loops that contradict one another.
 
-    Loops between maps that odometry does not join are let through: there is nothing to compare them with.
+    Loops between maps that odometry does not join can be compared with one another alone.
 
     Args:
         chain: odometry, its covariance widened where it was too small.
         loops: edges that may be false.
         max_residual: Mahalanobis distance that a cycle through two loops may be from closing.
         slack: how many times that a loop may lie from odometry alone.
+        support: loops that must agree before they join maps.
     """
     if not loops:
         return Screening(np.zeros(0), ())
@@ -73,6 +77,8 @@ def screen_loops(chain: OdometryChain, loops: Sequence[Edge], max_residual: floa
     ambiguous = _ambiguous(chain, [loops[i] for i in plausible.tolist()], distances[plausible], max_residual)
     for index in plausible[ambiguous]:
         reasons[index] = RejectionReason.AMBIGUOUS
+    for index in np.flatnonzero(unsupported(chain, loops, max_residual, support)):
+        reasons[index] = RejectionReason.UNSUPPORTED
     return Screening(distances, tuple(reasons))
 
 

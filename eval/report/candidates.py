@@ -27,6 +27,7 @@ REASONS = {
     "degenerate": "degenerate geometry",
     "inconsistent": "contradicts odometry",
     "ambiguous": "ambiguous",
+    "unsupported": "too few loops join the maps",
     "outlier": "outlier in the graph",
     "shed": "not verified: loop closing was behind",
 }

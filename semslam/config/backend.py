@@ -44,6 +44,9 @@ class BackendConfig(Section):
     drift_slack: float = setting(
         1.5, "factor on max_residual for a loop's distance from odometry alone; 0 = no such test", ge=0
     )
+    joining_loops: int = setting(
+        1, "loops that must agree before they join maps that odometry does not; `merge` asks for 3", ge=1
+    )
     max_odometry_scale: float = setting(
         10.0, "maximum factor on odometry's standard deviations where most loops contradict them", ge=1
     )

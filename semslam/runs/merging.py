@@ -21,10 +21,12 @@ from semslam.runs.recording import Recording, SavedFrontEnd
 from semslam.runs.result import RunResult
 from semslam.runs.results import fill
 from semslam.system.result import SlamResult
-from semslam.types import Motion, TrackingStatus, Trajectory
+from semslam.types import Motion, RejectionReason, TrackingStatus, Trajectory
 
 DETECTOR = "fused"
 """Proposes loops where the first run had no detector."""
+JOINING = 3
+"""Loops that must agree before they join the sessions, of which odometry can contradict none."""
 BREAK = 2.0
 """Times ``loops.min_gap``: seconds between the sessions, enough for loops between their ends."""
 
@@ -84,9 +86,13 @@ def prepare_merge(
 
 
 def merge_settings(config: Config) -> Config:
-    """The first run's settings, for a merge: a detector, and no choice of frames, which each session has made."""
+    """The first run's settings, for a merge: a detector, and no choice of frames, which each session has made.
+
+    The sessions are joined by ``JOINING`` loops that agree, or more where the run asked for more.
+    """
     detector = DETECTOR if config.detector == NoLoops.name else config.detector
-    return config.with_changes(dataset=DatasetConfig(), detector=detector)
+    joining = {"joining_loops": max(config.backend.joining_loops, JOINING)}
+    return config.with_changes(dataset=DatasetConfig(), detector=detector, backend=joining)
 
 
 def joining_loops(merge: Merge, slam: SlamResult) -> int:
@@ -101,7 +107,9 @@ def outcome_of(merge: Merge, slam: SlamResult) -> str:
     loops = joining_loops(merge, slam)
     if loops:
         return f"The two sessions are one map: {loops} accepted {'loop joins' if loops == 1 else 'loops join'} them."
-    return "The two sessions stay separate maps: no loop between them was accepted."
+    refused = sum(verdict.reason is RejectionReason.UNSUPPORTED for verdict in slam.solution.verdicts)
+    few = f": the {refused} between them are too few that agree" if refused else ""
+    return f"The two sessions stay separate maps: no loop between them was accepted{few}."
 
 
 def write_merge(

@@ -174,6 +174,7 @@ class RejectionReason(StrEnum):
     DEGENERATE = "degenerate"
     INCONSISTENT = "inconsistent"
     AMBIGUOUS = "ambiguous"
+    UNSUPPORTED = "unsupported"
     OUTLIER = "outlier"
     SHED = "shed"
 
