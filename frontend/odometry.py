@@ -33,3 +33,20 @@ class Odometry(Protocol):
         Raises:
             DatasetError: the frame's size does not fit its intrinsics.
         """
+
+
+@runtime_checkable
+class Preparing(Protocol):
+    """An odometry that does part of its work from the frame alone, so that it can be done before the frame's turn.
+
+    An odometry may lack it. ``track`` gives the same motion whether its frame was prepared or not.
+    """
+
+    def prepare(self, frame: Frame) -> None:
+        """Do that work for a frame that ``track`` is to be given later, perhaps in another thread than ``track``.
+
+        Frames are prepared one at a time and in order.
+
+        Raises:
+            DatasetError: the frame's size does not fit its intrinsics.
+        """

@@ -45,6 +45,7 @@ class FeatureMapOdometry:
         pyramid = {"levels": own.levels, "scale": own.scale}
         self._keypoints = config.keypoints.model_copy(update=pyramid)
         self._extractor = FeatureExtractor(self._keypoints)
+        self._prepared: dict[int, Features] = {}
         self._map = LocalMap(config.keypoints.count, self._scale)
         self._mapper = Mapper(self._map, own)
         self._prediction = ConstantVelocity()
@@ -69,6 +70,11 @@ class FeatureMapOdometry:
         """The current estimate of the rolling shutter's read-out time, seconds."""
         return self._readout.seconds
 
+    def prepare(self, frame: Frame) -> None:
+        """Find a frame's keypoints ahead of its turn; see ``Preparing``."""
+        check_frame(frame)
+        self._prepared[frame.index] = self._extractor.extract(frame)
+
     def track(self, frame: Frame) -> Motion:
         """Motion since the previous frame, with the landmarks seen; LOST where the frame's place was not found.
 
@@ -82,7 +88,8 @@ class FeatureMapOdometry:
         return motion
 
     def _track(self, frame: Frame) -> Motion:
-        raw = self._extractor.extract(frame)
+        prepared = self._prepared.pop(frame.index, None)
+        raw = self._extractor.extract(frame) if prepared is None else prepared
         self._mapper.proceed()
         if not self._started:
             self._started = True

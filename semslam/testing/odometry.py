@@ -8,7 +8,7 @@ import pytest
 
 from semslam.config import Config
 from semslam.errors import DatasetError
-from semslam.frontend.odometry import Odometry
+from semslam.frontend.odometry import Odometry, Preparing
 from semslam.geometry.camera import Intrinsics
 from semslam.geometry.se3 import compose, invert, is_rigid, rotation_angle
 from semslam.testing.scenes import room
@@ -85,6 +85,18 @@ class OdometryContract:
             motions = [odometry.track(frame) for frame in room().frames[:5]]
             runs.append(b"".join(m.T_prev_cur.tobytes() + m.covariance.tobytes() for m in motions))
         assert runs[0] == runs[1]
+
+    def test_prepared_frames_give_the_same_motions(self) -> None:
+        """What an odometry does ahead of a frame's turn changes nothing."""
+        plain, ahead, frames = self.make(), self.make(), room().frames[:6]
+        if not isinstance(ahead, Preparing):
+            pytest.skip("it prepares nothing")
+        for frame in frames:
+            ahead.prepare(frame)
+        for frame in frames:
+            expected, motion = plain.track(frame), ahead.track(frame)
+            assert np.array_equal(motion.T_prev_cur, expected.T_prev_cur)
+            assert np.array_equal(motion.covariance, expected.covariance)
 
     def test_frames_are_left_as_they_are(self) -> None:
         """Images belong to the caller."""

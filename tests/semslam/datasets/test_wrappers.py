@@ -93,6 +93,21 @@ def test_any_other_error_is_raised_at_its_place() -> None:
     assert readers() == []
 
 
+def test_frames_are_prepared_in_order_and_an_error_of_that_is_raised_at_its_place() -> None:
+    prepared = []
+
+    def prepare(frame: Frame) -> None:
+        prepared.append(frame.index)
+        if frame.index == 5:
+            raise DatasetError("of another size")
+
+    items = prefetch(Counting(bad=(3,)), prepare=prepare)
+    assert [isinstance(next(items), Frame) for _ in range(5)] == [True, True, True, False, True]
+    with pytest.raises(DatasetError, match="another size"):
+        next(items)
+    assert prepared[:5] == [0, 1, 2, 4, 5]
+
+
 def test_it_reads_no_more_than_asked_for_ahead() -> None:
     dataset = Counting(count=50)
     for item in prefetch(dataset, ahead=3):
