@@ -42,6 +42,9 @@ class Worker(ABC, Generic[Job, Answer]):
     def close(self) -> None:
         """Finish the jobs that are left, and end."""
 
+    def begin_close(self) -> None:
+        """Take no more jobs and begin to end, where that takes time; ``close`` waits for it."""
+
     def wait_until_ready(self) -> None:
         """Wait until jobs are begun as soon as they are submitted.
 
@@ -98,6 +101,7 @@ class ProcessWorker(Worker[Job, Answer]):
 
         self._pool = ProcessPoolExecutor(max_workers=1, mp_context=get_context("loky"), initializer=_obey_the_parent)
         self._prepared = self._pool.submit(_prepare, dumps(make))
+        self._ending: Thread | None = None
 
     def submit(self, job: Job) -> "Future[Answer]":
         """See ``Worker``."""
@@ -106,7 +110,15 @@ class ProcessWorker(Worker[Job, Answer]):
 
     def close(self) -> None:
         """See ``Worker``."""
-        self._pool.shutdown(wait=True)
+        self.begin_close()
+        assert self._ending is not None
+        self._ending.join()
+
+    def begin_close(self) -> None:
+        """See ``Worker``; a process takes a third of a second to unload its libraries."""
+        if self._ending is None:
+            self._ending = Thread(target=self._pool.shutdown, name="semslam-ending")
+            self._ending.start()
 
     def wait_until_ready(self) -> None:
         """See ``Worker``."""

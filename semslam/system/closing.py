@@ -11,6 +11,7 @@ from semslam.frontend.keyframes import DetailExtractor
 from semslam.loop.detector import NoLoops
 from semslam.loop.search import LoopSearch
 from semslam.loop.verification.verifier import LoopVerifier, build_verifier
+from semslam.runtime.libraries import load_registration_ahead
 from semslam.runtime.stopwatch import Calls, Stopwatch
 from semslam.runtime.usage import ProcessUsage, usage_now
 from semslam.runtime.workers import Worker, WorkerKind, make_worker
@@ -127,7 +128,14 @@ def build_closing(
     """
     if config.detector == NoLoops.name:
         return None
-    return make_worker(kind, partial(_make_closing, config, verifier))
+    make = _make_closing_in_process if kind is WorkerKind.PROCESS else _make_closing
+    return make_worker(kind, partial(make, config, verifier))
+
+
+def _make_closing_in_process(config: Config, verifier: LoopVerifier | None) -> Callable[[KeyframeJob], KeyframeAnswer]:
+    closing = _make_closing(config, verifier)
+    load_registration_ahead()
+    return closing
 
 
 def _make_closing(config: Config, verifier: LoopVerifier | None) -> Callable[[KeyframeJob], KeyframeAnswer]:
