@@ -99,7 +99,9 @@ class Session:
             with loaded_objects_left_alone():
                 yield from ((arrival.index, arrival.item, arrival.at) for arrival in self._feed.arrivals())
         else:
-            for index, item in enumerate(prefetch(self._dataset, stopwatch=self._stopwatch)):
+            for index, item in enumerate(
+                prefetch(self._dataset, stopwatch=self._stopwatch, prepare=self._slam.prepare)
+            ):
                 yield index, item, None
 
     def repeat(self, recording: Recording) -> Iterator[tuple[int, FrameState]]:
@@ -173,6 +175,7 @@ class Session:
         if not self._tracked:
             raise DatasetError((*self._unreadable, f"No frame of {self._dataset.name} could be tracked.")[0])
         slam = self._finished()
+        self._slam.begin_close()
         error = None if self._failure is None else f"Frame {self._done} ended the run: {as_our_own(self._failure)}"
         result = self._joined(slam, error)
         if error is not None:

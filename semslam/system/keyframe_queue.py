@@ -6,6 +6,9 @@ from collections.abc import Iterator
 from concurrent.futures import Future
 from dataclasses import replace
 
+import numpy as np
+
+from semslam.config import LoopConfig
 from semslam.runtime.workers import Worker, answer_of
 from semslam.system.closing import KeyframeAnswer, KeyframeJob
 
@@ -37,6 +40,10 @@ class KeyframeQueue(ABC):
         """Do without the answers for all keyframes so far, after one of them has failed."""
         self._pending.clear()
 
+    def begin_close(self) -> None:
+        """Begin to end the worker; no keyframe may come after it."""
+        self._worker.begin_close()
+
     def close(self) -> None:
         """End the worker."""
         self._worker.close()
@@ -45,22 +52,30 @@ class KeyframeQueue(ABC):
 class CountedQueue(KeyframeQueue):
     """An answer is due once a number of further keyframes have been made, never sooner and never later.
 
+    Until there can be a loop none is due, so that tracking need not wait while loop closing starts.
+
     Args:
         worker: closes loops.
         delay: that number; where an answer is due and not there, it is waited for.
+        min_gap: seconds between the first keyframe and the first that can be the query of a loop.
     """
 
-    def __init__(self, worker: Worker[KeyframeJob, KeyframeAnswer], delay: int) -> None:
+    def __init__(self, worker: Worker[KeyframeJob, KeyframeAnswer], delay: int, min_gap: float) -> None:
         super().__init__(worker)
-        self._delay = delay
+        self._delay, self._min_gap = delay, min_gap
+        self._first_loop = np.inf
+        self._can_have_loops = False
 
     def add(self, job: KeyframeJob) -> None:
         """See ``KeyframeQueue``."""
         self._pending.append(self._worker.submit(job))
+        stamp = job.keyframe.timestamp
+        self._first_loop = min(self._first_loop, stamp + self._min_gap)
+        self._can_have_loops = stamp >= self._first_loop
 
     def due(self) -> Iterator[KeyframeAnswer]:
         """See ``KeyframeQueue``."""
-        return self._first(self._delay)
+        return self._first(self._delay) if self._can_have_loops else iter(())
 
     def rest(self) -> Iterator[KeyframeAnswer]:
         """See ``KeyframeQueue``."""
@@ -108,3 +123,8 @@ class RealTimeQueue(KeyframeQueue):
     def _go_on(self, behind: int) -> None:
         if self._waiting and not self._pending:
             self._pending.append(self._worker.submit(replace(self._waiting.popleft(), behind=behind)))
+
+
+def make_queue(worker: Worker[KeyframeJob, KeyframeAnswer], config: LoopConfig, realtime: bool) -> KeyframeQueue:
+    """The queue of a run that waits for loop closing, or of one in real time."""
+    return RealTimeQueue(worker) if realtime else CountedQueue(worker, config.delay, config.min_gap)

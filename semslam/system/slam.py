@@ -12,14 +12,14 @@ from semslam.backend.pose_graph import PoseGraph
 from semslam.config import Config
 from semslam.errors import GraphError
 from semslam.frontend.keyframes import KeyframeBuilder
-from semslam.frontend.odometry import Odometry
+from semslam.frontend.odometry import Odometry, Preparing
 from semslam.geometry.se3 import adjoint, invert, orthonormalise
 from semslam.loop.verification.verifier import LoopVerifier
 from semslam.plugins import load
 from semslam.runtime.stopwatch import Stopwatch
 from semslam.runtime.workers import Worker, WorkerKind
 from semslam.system.closing import KeyframeAnswer, KeyframeJob, build_closing
-from semslam.system.keyframe_queue import CountedQueue, KeyframeQueue, RealTimeQueue
+from semslam.system.keyframe_queue import make_queue
 from semslam.system.recovery import recover_poses
 from semslam.system.refinement import refine
 from semslam.system.result import FrameState, SlamResult
@@ -51,9 +51,8 @@ class _Anchor:
 class Slam:
     """RGB-D SLAM: odometry, keyframes, loop closing, pose graph.
 
-    Tracking never reads the loops, so that the result is the same wherever loop closing runs. Its answer for a
-    keyframe moves the live poses from the frame at which ``loops.delay`` further keyframes have been made, never
-    sooner and never later. In real time it moves them once it is there, and nothing waits for it.
+    Tracking never reads the loops, so that the result is the same wherever loop closing runs. When its answer for a
+    keyframe moves the live poses is counted in keyframes (``CountedQueue``); in real time nothing waits for it.
 
     Args:
         odometry: tracks frames.
@@ -80,7 +79,7 @@ class Slam:
         self._odometry = odometry
         self._builder = builder
         self._closing = closing
-        self._queue = None if closing is None else _queue(closing, config.loops.delay, realtime)
+        self._queue = None if closing is None else make_queue(closing, config.loops, realtime)
         self._graph = graph
         self._config = config
         self._stopwatch = stopwatch
@@ -134,6 +133,18 @@ class Slam:
     def keyframes(self) -> tuple[Keyframe, ...]:
         """The keyframes so far."""
         return tuple(self._keyframes)
+
+    def prepare(self, frame: Frame) -> None:
+        """Do what tracking needs of a frame alone, in another thread if need be, before ``process`` is given it.
+
+        The result is the same without; frames are prepared one at a time and in order.
+
+        Raises:
+            DatasetError: the frame does not fit its intrinsics.
+        """
+        if isinstance(self._odometry, Preparing):
+            with self._stopwatch.stage("prepare"):
+                self._odometry.prepare(frame)
 
     def process(self, frame: Frame) -> FrameState:
         """Track a frame and, where it is due, make it a keyframe and look for loops.
@@ -219,6 +230,11 @@ class Slam:
         if self._closing is not None:
             self._closing.wait_until_ready()
 
+    def begin_close(self) -> None:
+        """Begin to end what runs beside tracking, after the last frame; ``close`` waits for it."""
+        if self._queue is not None:
+            self._queue.begin_close()
+
     def close(self) -> None:
         """End what runs beside tracking; the keyframes so far are still finished."""
         if self._queue is not None:
@@ -286,7 +302,3 @@ class Slam:
         """For each map of the odometry the place of its component in ``solution.components``, the largest first."""
         place = {key: index for index, keys in enumerate(solution.components) for key in keys}
         return {keyframe.map_id: place[keyframe.id] for keyframe in self._keyframes}
-
-
-def _queue(worker: Worker[KeyframeJob, KeyframeAnswer], delay: int, realtime: bool) -> KeyframeQueue:
-    return RealTimeQueue(worker) if realtime else CountedQueue(worker, delay)

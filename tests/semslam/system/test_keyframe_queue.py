@@ -32,17 +32,29 @@ class SlowWorker(Worker):
 
 
 def job(number: int) -> KeyframeJob:
-    return KeyframeJob(SimpleNamespace(id=number), None, None)
+    return KeyframeJob(SimpleNamespace(id=number, timestamp=0.5 * number), None, None)
 
 
 def test_an_answer_counts_after_as_many_keyframes_as_set() -> None:
     worker = SlowWorker()
-    queue = CountedQueue(worker, delay=2)
+    queue = CountedQueue(worker, delay=2, min_gap=0.0)
     for number in range(4):
         queue.add(job(number))
         worker.answer()
         assert list(queue.due()) == ([] if number < 2 else [(number - 2, 0)])
     assert list(queue.rest()) == [(2, 0), (3, 0)]
+
+
+def test_nothing_is_waited_for_while_there_can_be_no_loop() -> None:
+    worker = SlowWorker()
+    queue = CountedQueue(worker, delay=1, min_gap=2.0)
+    for number in range(4):
+        queue.add(job(number))
+        assert list(queue.due()) == []
+    queue.add(job(4))
+    for _ in range(4):
+        worker.answer()
+    assert list(queue.due()) == [(number, 0) for number in range(4)]
 
 
 def test_in_real_time_nothing_is_waited_for() -> None:
