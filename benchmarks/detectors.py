@@ -39,7 +39,10 @@ from semslam.loop.verification.submaps import ends_of
 from semslam.studies.detectors import compare_detectors, exhaustive_detector, keyframe_views
 from semslam.types import Frame, KeyframeView, LoopConstraint, Transforms
 
-NAMES = "fused,semantic,semantic-paper,dbow,sda,cnnw,conv3,thumbnail,hog,gist"
+NAMES = (
+    "fused,semantic,semantic-paper,dbow,sda,cnnw,conv3,placecnn,pcanet,topology,subgraph,static-cnn,tnnlost,"
+    "thumbnail,hog,gist"
+)
 PARTS = "precision,calibration,changes,verified,mixed,speed"
 LATER = 1000.0
 """Seconds between one sequence and the next in a common database, or between a sequence and a changed query."""
@@ -82,6 +85,8 @@ def print_precision(dataset: Dataset, names: list[str], every: int, calibration:
         figures = (q.average_precision, q.recall_at_99_precision, q.recall_at_100_precision, q.max_f1, q.recall_at_1)
         print(f"| {q.detector} | " + " | ".join(f"{x:.3f}" for x in figures) + f" | {q.ms_per_query:.1f} |", flush=True)
     print()
+    for name, source in comparison.features_from.items():
+        print(f"`{name}`: features of {source}\n")
     if calibration and "fused" in names:
         bins = comparison.reliabilities["fused"]
         print("| probability by `fused` | pairs | mean probability | share true |\n|---|---|---|---|")

@@ -43,6 +43,7 @@ DETECTORS: dict[str, str] = {
     "topology": "semslam.loop.detectors.topology.detector:TopologyDetector",
     "subgraph": "semslam.loop.detectors.subgraph.detector:SubgraphDetector",
     "static-cnn": "semslam.loop.detectors.static_cnn.detector:StaticCnnDetector",
+    "placecnn": "semslam.loop.detectors.placecnn.detector:PlaceCnnDetector",
     "tnnlost": "semslam.loop.detectors.tnnlost.detector:TnnLostDetector",
     "pcanet": "semslam.loop.detectors.pcanet.detector:PcaNetDetector",
     "dbow": "semslam.loop.detectors.bag_of_words.detector:DbowDetector",

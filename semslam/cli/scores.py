@@ -112,6 +112,8 @@ def loops_command(
         figures = (q.average_precision, q.recall_at_100_precision, q.recall_at_99_precision, q.max_f1, q.recall_at_1)
         table.add_row(q.detector, *("-" if f is None else f"{f:.3f}" for f in figures), f"{q.ms_per_query:.1f}")
     out.print(table)
+    for name, source in comparison.features_from.items():
+        out.print(f"{name}: features of {source}", soft_wrap=True)
     out.print(f"{q.true_pairs} true and {q.false_pairs} false pairs; results: {out_directory}", soft_wrap=True)
 
 

@@ -37,11 +37,13 @@ class DetectorComparison:
         qualities: metrics, in the order of the names.
         curves: precision and recall by detector.
         reliabilities: share of true pairs by score, by detector.
+        features_from: which weights a detector's features are of, by detector, where it has a choice of them.
     """
 
     qualities: tuple[DetectorQuality, ...]
     curves: dict[str, Curve]
     reliabilities: dict[str, tuple[ScoreBin, ...]]
+    features_from: dict[str, str]
 
 
 def compare_detectors(
@@ -80,6 +82,11 @@ def compare_detectors(
         qualities,
         {name: curve_of(answers[name].scores, truth) for name in names},
         {name: reliability_of(answers[name].scores, truth) for name in names},
+        {
+            name: str(c.ordinary.features_from)
+            for name, c in contestants.items()
+            if hasattr(c.ordinary, "features_from")
+        },
     )
 
 

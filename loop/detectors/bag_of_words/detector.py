@@ -1,22 +1,34 @@
-"""Bags of binary words (Gálvez-López and Tardós, T-RO 2012)."""
+"""Bags of words (Gálvez-López and Tardós, T-RO 2012)."""
 
+from pathlib import Path
 from typing import Self
 
 import numpy as np
 
 from semslam.config import Config, LoopConfig, Section, setting
+from semslam.errors import ModelError
 from semslam.loop.detector import Arrays
-from semslam.loop.detectors.bag_of_words.vocabulary import Vocabulary, load_vocabulary
+from semslam.loop.detectors.bag_of_words.vocabulary import Descriptors, Vocabulary, load_vocabulary
 from semslam.loop.detectors.bag_of_words.word_index import Bag, WordIndex, bag_of_arrays, bag_to_arrays
+from semslam.loop.detectors.bag_of_words.words import (
+    LAYOUTS,
+    MIN_SCORES,
+    Describer,
+    WordKind,
+    describer,
+    shipped_vocabulary,
+)
 from semslam.loop.detectors.common.remembering import RememberingDetector
-from semslam.types import FloatArray, KeyframeView, LoopCandidate, LoopEvidence, UInt8Array
+from semslam.types import FloatArray, KeyframeView, LoopCandidate, LoopEvidence
 
 
 class DbowConfig(Section):
-    """How scores of neighbouring keyframes are grouped."""
+    """What words are made of, and how scores of neighbouring keyframes are grouped."""
 
+    words: WordKind = setting(WordKind.ORB, "local descriptors that words are made of")
+    vocabulary: Path | None = setting(None, "vocabulary of these words; none = the shipped one, which surf has not")
     group: float = setting(0.35, "keyframes within this time are scored together", unit="s", ge=0)
-    min_score: float = setting(0.04, "score threshold of a candidate", ge=0, le=1)
+    min_score: float | None = setting(None, "score threshold of a candidate; none = that of the words", ge=0, le=1)
 
 
 class DbowDetector(RememberingDetector[Bag]):
@@ -31,9 +43,10 @@ class DbowDetector(RememberingDetector[Bag]):
     needs_labels = False
     Settings = DbowConfig
 
-    def __init__(self, vocabulary: Vocabulary, config: DbowConfig, loops: LoopConfig) -> None:
-        super().__init__(loops, config.min_score)
+    def __init__(self, vocabulary: Vocabulary, describe: Describer, config: DbowConfig, loops: LoopConfig) -> None:
+        super().__init__(loops, MIN_SCORES[config.words] if config.min_score is None else config.min_score)
         self._vocabulary = vocabulary
+        self._descriptors = describe
         self._group = config.group
         self._index = WordIndex()
 
@@ -42,9 +55,12 @@ class DbowDetector(RememberingDetector[Bag]):
         """Take the sections ``dbow`` and ``loops``.
 
         Raises:
-            ModelError: the shipped vocabulary is missing or damaged.
+            ModelError: the vocabulary is missing, damaged, or one of other words.
+            ConfigError: this OpenCV has no such words.
         """
-        return cls(load_vocabulary(), config.section(cls.name, cls.Settings), config.loops)
+        own = config.section(cls.name, cls.Settings)
+        describe = describer(own.words)
+        return cls(vocabulary_of(own.words, own.vocabulary), describe, own, config.loops)
 
     def query(self, view: KeyframeView) -> list[LoopCandidate]:
         """Candidates by grouped score."""
@@ -61,7 +77,7 @@ class DbowDetector(RememberingDetector[Bag]):
         ]  # fmt: skip
 
     def _describe(self, view: KeyframeView) -> Bag:
-        return make_bag(self._vocabulary, view.keyframe.features.descriptors)
+        return make_bag(self._vocabulary, self._descriptors(view))
 
     def _clear(self) -> None:
         self._index = WordIndex()
@@ -76,8 +92,21 @@ class DbowDetector(RememberingDetector[Bag]):
         return bag_of_arrays(arrays)
 
 
-def make_bag(vocabulary: Vocabulary, descriptors: UInt8Array) -> Bag:
-    """The words of descriptors (N, 32) with their tf-idf weights."""
+def vocabulary_of(words: WordKind, path: Path | None) -> Vocabulary:
+    """The vocabulary in a file, or else the one that ships for these words.
+
+    Raises:
+        ModelError: the vocabulary is missing, damaged, or one of other words.
+    """
+    vocabulary = load_vocabulary(path or shipped_vocabulary(words))
+    length, binary = vocabulary.centres[0].shape[1], vocabulary.centres[0].dtype == np.uint8
+    if (length, binary) != LAYOUTS[words]:
+        raise ModelError(f"{path} is a vocabulary of other words than '{words}'.")
+    return vocabulary
+
+
+def make_bag(vocabulary: Vocabulary, descriptors: Descriptors) -> Bag:
+    """The words of descriptors (N, D) with their tf-idf weights."""
     words, counts = np.unique(vocabulary.words(descriptors), return_counts=True)
     weights = counts * vocabulary.weights[words]
     used = weights > 0

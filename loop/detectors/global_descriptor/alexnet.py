@@ -1,4 +1,4 @@
-"""AlexNet's first three convolutions (Krizhevsky et al., 2012) with torchvision's weights, where the user has them."""
+"""AlexNet (Krizhevsky et al., 2012) with torchvision's layout and weights, where the user has them."""
 
 import hashlib
 from pathlib import Path
@@ -52,19 +52,36 @@ class AlexNetMap:
 
     def __call__(self, color: UInt8Array) -> Float32Array:
         """Features (13, 13, 384) of an RGB image (H, W, 3)."""
-        small = cv2.resize(color, (SIZE, SIZE), interpolation=cv2.INTER_AREA).astype(np.float32) / 255
-        pixels = np.ascontiguousarray(((small - MEAN) / DEVIATION).transpose(2, 0, 1))[None].astype(np.float32)
         with torch.no_grad():
-            out = self._network(torch.from_numpy(pixels))[0]
+            out = self._network(normalised(color))[0]
         return np.asarray(out.permute(1, 2, 0).numpy(), dtype=np.float32)
 
 
-def build_network() -> nn.Sequential:
-    """The layers of torchvision's ``alexnet().features`` up to its third convolution, untrained."""
-    return nn.Sequential(
+def normalised(color: UInt8Array) -> torch.Tensor:
+    """AlexNet's input (1, 3, 224, 224) for an RGB image (H, W, 3)."""
+    small = cv2.resize(color, (SIZE, SIZE), interpolation=cv2.INTER_AREA).astype(np.float32) / 255
+    pixels = np.ascontiguousarray(((small - MEAN) / DEVIATION).transpose(2, 0, 1))[None].astype(np.float32)
+    return torch.from_numpy(pixels)
+
+
+def build_network(layers: int = 7) -> nn.Sequential:
+    """The first layers of torchvision's ``alexnet().features``, untrained: 7 end with the third convolution, of 13."""
+    stages = (
         nn.Conv2d(3, 64, 11, stride=4, padding=2), nn.ReLU(), nn.MaxPool2d(3, 2),
         nn.Conv2d(64, 192, 5, padding=2), nn.ReLU(), nn.MaxPool2d(3, 2),
-        nn.Conv2d(192, 384, 3, padding=1),
+        nn.Conv2d(192, 384, 3, padding=1), nn.ReLU(),
+        nn.Conv2d(384, 256, 3, padding=1), nn.ReLU(),
+        nn.Conv2d(256, 256, 3, padding=1), nn.ReLU(), nn.MaxPool2d(3, 2),
+    )  # fmt: skip
+    return nn.Sequential(*stages[:layers])
+
+
+def build_classifier(classes: int) -> nn.Sequential:
+    """Torchvision's ``alexnet().classifier``, untrained."""
+    return nn.Sequential(
+        nn.Dropout(), nn.Linear(256 * 6 * 6, 4096), nn.ReLU(),
+        nn.Dropout(), nn.Linear(4096, 4096), nn.ReLU(),
+        nn.Linear(4096, classes),
     )  # fmt: skip
 
 

@@ -86,14 +86,17 @@ def static_cells(features: Float32Array, static: npt.NDArray[np.bool_], grid: in
         static: (H, W) which pixels do not move.
         grid: rows and columns.
     """
-    height, width, channels = features.shape
+    height, width = features.shape[:2]
     weights = cv2.resize(static.astype(np.float32), (width, height), interpolation=cv2.INTER_AREA)
-    cells = np.zeros((grid, grid, channels), np.float32)
-    rows, columns = (np.linspace(0, side, grid + 1).round().astype(int) for side in (height, width))
-    for row in range(grid):
-        for column in range(grid):
-            part = np.s_[rows[row] : rows[row + 1], columns[column] : columns[column + 1]]
-            if weights[part].size and weights[part].mean() >= MIN_STATIC:
-                cells[row, column] = np.average(features[part], axis=(0, 1), weights=weights[part])
+    rows, columns = (_members(side, grid) for side in (height, width))
+    covered = rows @ weights @ columns.T
+    sums = np.einsum("rh,hwk,cw->rck", rows, features * weights[..., None], columns, optimize=True)
+    counted = covered >= np.maximum(MIN_STATIC * np.outer(rows.sum(axis=1), columns.sum(axis=1)), 1e-6)
+    cells = np.where(counted[..., None], sums / np.maximum(covered, 1e-6)[..., None], 0)
     flat = cells.ravel()
     return np.asarray(flat / max(float(np.linalg.norm(flat)), 1e-9), dtype=np.float32)
+
+
+def _members(side: int, grid: int) -> Float32Array:
+    """Which of ``side`` places belong to each cell, (grid, side) of 0 and 1."""
+    return np.asarray(np.arange(side) * grid // side == np.arange(grid)[:, None], dtype=np.float32)

@@ -1,0 +1,1 @@
+"""Features of a network that knows places."""
