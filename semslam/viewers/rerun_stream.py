@@ -52,7 +52,7 @@ def open_viewer(
     sinks: list[rr.FileSink | rr.GrpcSink] = []
     try:
         if live:
-            rr.spawn(connect=False)
+            rr.spawn(connect=False, executable_path=_program(), recording=stream)
             sinks.append(rr.GrpcSink())
         if file is not None:
             file.parent.mkdir(parents=True, exist_ok=True)
@@ -62,3 +62,11 @@ def open_viewer(
         raise ResultsError(f"The viewer cannot be opened: {' '.join(str(error).split())}.") from error
     stream.send_recording_name(name)
     return RerunViewer(stream)
+
+
+def _program() -> str | None:
+    """The viewer that comes with rerun-sdk, on the search path or not; None = the one on the search path."""
+    package = find_spec("rerun_cli")
+    places = [] if package is None else [Path(place) for place in package.submodule_search_locations or ()]
+    found = [place / name for place in places for name in ("rerun", "rerun.exe") if (place / name).is_file()]
+    return str(found[0]) if found else None

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, cast
 import cv2
 import numpy as np
 
+from semslam.errors import ResultsError
 from semslam.eval.looks import ACCEPTED, ODOMETRY, OPTIMISED, OUTCOMES, REJECTED, TRUTH
 from semslam.geometry.se3 import Points3, rotations_to_quaternions, transform_points
 from semslam.loop.detectors.semantic.nodes import extract_nodes
@@ -33,6 +34,8 @@ IMAGE_INTERVAL = 0.09
 """Seconds between two colour images that are shown: ten a second; compressing them is most of a viewer's work."""
 PNG_FAST = [cv2.IMWRITE_PNG_COMPRESSION, 1, cv2.IMWRITE_PNG_FILTER, cv2.IMWRITE_PNG_FILTER_NONE]
 MILLIMETRES = 1000.0
+PATIENCE = 10.0
+"""Seconds that a window may take for what it has not shown yet; one that was closed takes for ever."""
 FRUSTUM = 0.25
 """Metres from the camera's centre at which its image is drawn."""
 WAITING = 64
@@ -136,9 +139,20 @@ class RerunViewer:
             self._final(f"loops/{outcome.value}", _lines(finished.ledger, outcome, places))
 
     def close(self) -> None:
-        """See ``Viewer``."""
-        self._stream.flush()
-        self._stream.disconnect()
+        """See ``Viewer``.
+
+        Raises:
+            ResultsError: the window, or the file, did not take all that was shown.
+        """
+        try:
+            self._stream.flush(timeout_sec=PATIENCE)
+        except RuntimeError as error:
+            reason = " ".join(str(error).split()).rstrip(".")
+            raise ResultsError(
+                f"The viewer did not take all of it, as if its window had been closed ({reason})."
+            ) from error
+        finally:
+            self._stream.disconnect()
 
     def _set_time(self, index: int, timestamp: float) -> None:
         """What is logged next belongs to this frame."""

@@ -12,6 +12,9 @@ from semslam.config import Config
 from semslam.datasets import open_dataset
 from semslam.runs.pipeline import replay, run
 from semslam.runs.results import write_run
+from semslam.viewers import rerun_viewer
+from semslam.viewers.background import BackgroundViewer
+from semslam.viewers.rerun_stream import open_viewer
 from tests.conftest import Call, WallDataset
 
 pytest.importorskip("rerun", reason="the extra 'rerun' is not installed")
@@ -118,6 +121,22 @@ def test_without_the_package_it_is_one_sentence(
     assert outcome.code == 2
     assert "pip install 'semslam[rerun]'" in outcome.err
     assert "Traceback" not in outcome.err
+
+
+def test_a_window_is_started_and_may_be_closed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The program that comes with the package is started; nothing listens here, as after its window was closed."""
+    import rerun_bindings
+
+    started: list[dict[str, object]] = []
+    monkeypatch.setattr(rerun_bindings, "spawn", lambda **options: started.append(options))
+    monkeypatch.setattr(rerun_viewer, "PATIENCE", 0.2)
+    problems: list[str] = []
+    viewer = BackgroundViewer(lambda: open_viewer("room", None, live=True), problems.append)
+    viewer.close()
+    assert len(started) == 1
+    assert Path(str(started[0]["executable_path"])).is_file()
+    assert len(problems) == 1
+    assert problems[0].startswith("Nothing more is shown: The viewer did not take all of it")
 
 
 def test_a_place_that_cannot_be_written_is_known_before_the_run(semslam: Call, tmp_path: Path) -> None:
