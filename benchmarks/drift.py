@@ -114,10 +114,10 @@ def measure_start(arguments: argparse.Namespace, task: tuple[str, int, bool]) ->
         dataset = Rendered(dataset, arguments.folder / "frames" / file_name(name))
     if start or arguments.max_frames:
         dataset = Selection(dataset, start, arguments.max_frames)
-    verifier = Remembered(Config())
     odometries = [*listed(arguments.odometries), *(listed(arguments.once) if once else [])]
     for odometry in odometries:
         config = config_of(arguments, odometry, start)
+        verifier = Remembered(Config())  # one each: an odometry's velocities take the rolling shutter out of keyframes
         kept = arguments.folder / f"{file_name(name)}-{odometry}-{start}"
         for detector in listed(arguments.detectors):
             if (name, odometry, str(start), detector) in done:

@@ -7,9 +7,10 @@ import numpy as np
 
 from semslam.config import Config, KeyframeConfig
 from semslam.features import FeatureExtractor
+from semslam.frontend.rolling_shutter import still, still_cloud, velocity_of
 from semslam.frontend.surface import make_cloud
 from semslam.geometry.se3 import Transform, invert, orthonormalise, rotation_angle
-from semslam.types import Frame, Keyframe, Motion, TrackingStatus
+from semslam.types import FloatArray, Frame, Keyframe, Motion, TrackingStatus
 
 STAMP_TOLERANCE = 1e-3
 """Seconds by which a stamp may fall short of the interval, so that rounded stamps keep a steady rhythm."""
@@ -80,7 +81,7 @@ class DetailExtractor:
             keyframe: one without.
             frame: its images.
         """
-        return replace(keyframe, details=self._extractor.extract(frame))
+        return replace(keyframe, details=still(self._extractor.extract(frame), frame, keyframe.velocity))
 
 
 class KeyframeBuilder:
@@ -98,6 +99,8 @@ class KeyframeBuilder:
         self._extractor = FeatureExtractor(config.keypoints)
         self._details = DetailExtractor(config) if details else None
         self._pose = TrackedPose(-1, 0.0, np.eye(4), 0)
+        self._velocity: FloatArray | None = None
+        self._is_tracked = False
         self._last: TrackedPose | None = None
         self._count = 0
 
@@ -118,18 +121,29 @@ class KeyframeBuilder:
             Whether the frame should become a keyframe; a frame whose tracking is lost never should.
         """
         T_odom_cam = orthonormalise(self._pose.T_odom_cam @ motion.T_prev_cur)
+        self._velocity = self._velocity_by(motion, timestamp)
         self._pose = TrackedPose(index, timestamp, T_odom_cam, motion.map_id)
         return motion.status is not TrackingStatus.LOST and self._policy.is_due(self._pose, self._last)
+
+    def _velocity_by(self, motion: Motion, timestamp: float) -> FloatArray | None:
+        """The camera's velocity over a motion; None where it was lost, since a motion out of that is none."""
+        was_tracked, self._is_tracked = self._is_tracked, motion.status is not TrackingStatus.LOST
+        if not (was_tracked and self._is_tracked and motion.map_id == self._pose.map_id):
+            return None
+        return velocity_of(motion.T_prev_cur, timestamp - self._pose.timestamp)
 
     def build(self, frame: Frame) -> Keyframe:
         """Make the newest frame a keyframe."""
         self._last = self._pose
-        return self.build_at(frame, self._pose.T_odom_cam, self._pose.map_id)
+        return self.build_at(frame, self._pose.T_odom_cam, self._pose.map_id, self._velocity)
 
-    def build_at(self, frame: Frame, T_odom_cam: Transform, map_id: int = 0) -> Keyframe:
+    def build_at(
+        self, frame: Frame, T_odom_cam: Transform, map_id: int = 0, velocity: FloatArray | None = None
+    ) -> Keyframe:
         """Make a frame whose pose is known from elsewhere a keyframe: features and a thinned cloud stay, no images.
 
-        Keyframes are numbered from 0 in the order in which they are built.
+        Keyframes are numbered from 0 in the order in which they are built. Where the camera's velocity is known, what a
+        rolling shutter has bent is straightened by it.
         """
         keyframe = Keyframe(
             id=self._count,
@@ -138,8 +152,9 @@ class KeyframeBuilder:
             T_odom_cam=T_odom_cam,
             map_id=map_id,
             intrinsics=frame.intrinsics,
-            features=self._extractor.extract(frame),
-            cloud=make_cloud(frame, self._config),
+            features=still(self._extractor.extract(frame), frame, velocity),
+            cloud=still_cloud(make_cloud(frame, self._config), frame, velocity),
+            velocity=velocity,
         )
         self._count += 1
         return keyframe if self._details is None else self._details.complete(keyframe, frame)

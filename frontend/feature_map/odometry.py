@@ -12,10 +12,11 @@ from semslam.frontend.feature_map.landmarks import NONE
 from semslam.frontend.feature_map.local_map import LocalMap, MapKeyframe
 from semslam.frontend.feature_map.map_pose import Located, View, locate
 from semslam.frontend.feature_map.mapping import Mapper
+from semslam.frontend.feature_map.readout import ReadoutEstimate
 from semslam.frontend.feature_map.relocalisation import match_and_solve, relocalise
-from semslam.frontend.feature_map.rolling_shutter import ReadoutEstimate, rectify, velocity_of
 from semslam.frontend.feature_map.settings import FeatureMapConfig
 from semslam.frontend.prediction import ConstantVelocity, check_frame, first_motion, wide_covariance
+from semslam.frontend.rolling_shutter import rectify, velocity_of
 from semslam.geometry.reprojection import measure
 from semslam.geometry.se3 import invert, rotation_angle, transform_points
 from semslam.runtime.threads import one_blas_thread

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from semslam.geometry.camera import Intrinsics
-from semslam.types.arrays import Float32Array, Transform, UInt8Array
+from semslam.types.arrays import Float32Array, FloatArray, Transform, UInt8Array
 from semslam.types.features import Cloud, Features
 from semslam.types.images import LabelMap
 
@@ -22,6 +22,8 @@ class Keyframe:
         features: keypoints with depth.
         cloud: a thinned cloud with normals.
         details: more keypoints, for the verification of loops; None = the features serve.
+        velocity: (6,) angular and linear, radians and metres a second, in the camera's frame, by which keypoints and
+            cloud are as a global shutter would have seen them; None where it is not known.
         around: the other keyframes of its submap, while a loop between submaps is verified.
     """
 
@@ -34,6 +36,7 @@ class Keyframe:
     features: Features
     cloud: Cloud
     details: Features | None = None
+    velocity: FloatArray | None = None
     around: tuple["Keyframe", ...] = ()
 
     @property

@@ -1,5 +1,7 @@
 """Which frames become keyframes, and with which pose, map and number."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from semslam.config import Config
@@ -50,6 +52,31 @@ def test_a_keyframe_holds_pose_map_and_number() -> None:
     assert [(k.id, k.frame_index, k.map_id) for k in made] == [(0, 0, 0), (1, 2, 0), (2, 4, 1)]
     np.testing.assert_allclose([k.T_odom_cam[0, 3] for k in made], [0.05, 0.15, 0.25])
     assert all(k.details is not None and len(k.details) and len(k.cloud) for k in made)
+
+
+def test_a_keyframe_has_the_velocity_of_the_motion_to_it_unless_tracking_was_lost() -> None:
+    builder = KeyframeBuilder(Config(), details=False)
+    statuses = [*[TrackingStatus.OK] * 2, TrackingStatus.LOST, TrackingStatus.RELOCALISED, TrackingStatus.DEGRADED]
+    velocities = []
+    for index, status in enumerate(statuses):
+        builder.advance(index, 0.1 * index, motion(status))
+        velocities.append(builder.build(frame(index)).velocity)
+    assert [velocity is None for velocity in velocities] == [True, False, True, True, False]
+    np.testing.assert_allclose(velocities[1], [0, 0, 0, 0.5, 0, 0], atol=1e-12)
+
+
+def test_a_rolling_shutter_is_taken_out_of_keypoints_details_and_cloud() -> None:
+    rolling = replace(frame(0), intrinsics=replace(CAMERA, readout=0.03))
+    velocity = np.array([0.0, 1.5, 0.0, 0.0, 0.0, 0.0])
+    still, moving = (
+        KeyframeBuilder(Config()).build_at(rolling, np.eye(4), velocity=known) for known in (None, velocity)
+    )
+    for before, after in ((still.features, moving.features), (still.finest, moving.finest)):
+        rows = before.pixels[:, 1]
+        shift = np.sign(after.pixels[:, 0] - before.pixels[:, 0])
+        assert (shift[rows > 80] == 1).all()
+        assert (shift[rows < 40] == -1).all()
+    assert not np.allclose(still.cloud.points, moving.cloud.points)
 
 
 def test_details_are_left_out_where_nothing_verifies() -> None:

@@ -10,12 +10,13 @@ from hypothesis import strategies as st
 from semslam.config import Config
 from semslam.features import lift
 from semslam.frontend.feature_map.odometry import FeatureMapOdometry
-from semslam.frontend.feature_map.rolling_shutter import ReadoutEstimate, rectify, velocity_of
+from semslam.frontend.feature_map.readout import ReadoutEstimate
 from semslam.frontend.feature_map.settings import FeatureMapConfig
+from semslam.frontend.rolling_shutter import rectify, rectify_cloud, velocity_of
 from semslam.geometry.camera import Intrinsics
 from semslam.geometry.reprojection import measure
 from semslam.geometry.se3 import exp_so3, invert, make_transform, transform_points
-from semslam.types import Features, FloatArray, Frame
+from semslam.types import Cloud, Features, FloatArray, Frame
 
 CAMERA = Intrinsics(640, 480, 525.0, 525.0, 320.0, 240.0)
 
@@ -62,10 +63,25 @@ def test_rectified_keypoints_are_those_of_a_global_shutter(seed: int) -> None:
     assert np.allclose(straight.points, points, atol=0.01)
 
 
+@given(st.integers(0, 1000))
+@settings(max_examples=10, deadline=None)
+def test_a_rectified_cloud_is_that_of_a_global_shutter(seed: int) -> None:
+    points, velocity = world(seed)
+    bent = rolling(points, velocity, 0.026).points
+    normals = np.tile(np.float32([0.0, 0.0, -1.0]), (len(points), 1))
+    cloud = rectify_cloud(Cloud(bent, normals), CAMERA, velocity, 0.026)
+    error = np.linalg.norm(cloud.points - points, axis=1)
+    assert error.max() < 0.01
+    assert error.mean() < 0.1 * np.linalg.norm(bent - points, axis=1).mean() + 1e-4
+    assert np.allclose(np.linalg.norm(cloud.normals, axis=1), 1.0, atol=1e-6)
+
+
 def test_no_readout_changes_nothing() -> None:
     points, velocity = world(0)
     features = features_of(CAMERA.project(points), points[:, 2])
     assert rectify(features, CAMERA, velocity, 0.0) is features
+    cloud = Cloud(points.astype(np.float32), points.astype(np.float32))
+    assert rectify_cloud(cloud, CAMERA, velocity, 0.0) is cloud
 
 
 def test_velocity_is_motion_by_time() -> None:

@@ -1,17 +1,9 @@
-"""Rolling shutter: the rows of an image are exposed one after another, and the camera moves meanwhile.
-
-A Kinect's colour camera takes about 26 ms from its first row to its last. At 100 degrees a second that bends the image
-by more than 20 pixels, which no rigid pose explains. Keypoints are moved to where they would have been had all rows
-been exposed with the principal point's row, from the velocity between frames; the read-out time is estimated.
-"""
-
-from dataclasses import replace
+"""The read-out time of a rolling shutter, estimated while tracking."""
 
 import numpy as np
 
 from semslam.geometry.reprojection import Measurements, pose_jacobians, project_stereo
-from semslam.geometry.se3 import tangent
-from semslam.types import Features, FloatArray, Intrinsics, Points3, Transform
+from semslam.types import FloatArray, Intrinsics, Points3
 
 FASTEST = 0.04
 """Seconds; no read-out is longer than a frame at 25 Hz."""
@@ -20,38 +12,6 @@ FORGET = 0.97
 
 TRUST = 1e-2
 """Factor on a frame's information: landmarks were themselves made with the estimated read-out, which hides errors."""
-
-
-def velocity_of(T_prev_cur: Transform, seconds: float) -> FloatArray:
-    """Angular and linear velocity (6,) of a camera that moved by T_prev_cur (4, 4) in a time."""
-    return tangent(T_prev_cur) / max(seconds, 1e-3)
-
-
-def rectify(features: Features, camera: Intrinsics, velocity: FloatArray, readout: float) -> Features:
-    """Move keypoints to where a global shutter would have seen them.
-
-    Args:
-        features: keypoints, undistorted.
-        camera: the camera.
-        velocity: (6,) angular and linear, radians and metres a second, in the camera's frame.
-        readout: seconds from the first row to the last.
-    """
-    if readout == 0 or not len(features):
-        return features
-    rays = np.column_stack(
-        [(features.pixels - (camera.cx, camera.cy)) / (camera.fx, camera.fy), np.ones(len(features))]
-    )
-    delay = readout * (features.pixels[:, 1] - camera.cy) / camera.height
-    seen = features.depths > 0
-    inverse_depths = np.where(seen, 1.0 / np.where(seen, features.depths, 1.0), 0.0)
-    rays += delay[:, None] * (np.cross(velocity[:3], rays) + velocity[3:] * inverse_depths[:, None])
-    depths = features.depths * rays[:, 2]
-    return replace(
-        features,
-        pixels=camera.project(rays).astype(np.float32),
-        depths=depths.astype(np.float32),
-        points=(rays * features.depths[:, None]).astype(np.float32),
-    )
 
 
 class ReadoutEstimate:
