@@ -1,6 +1,7 @@
 """How pictures are drawn: fonts, sizes and file formats. Equal pictures are equal bytes."""
 
 import io
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
@@ -14,11 +15,12 @@ from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties, findfont
 from matplotlib.lines import Line2D
 
-from semslam.errors import ConfigError
+from semslam.errors import ConfigError, printable
 
 DPI = 130
 FONT, FONT_SIZE = "DejaVu Sans", 9.5
 STYLE: dict[str, object] = {
+    "text.parse_math": False,  # a dollar in a name is a dollar
     "axes.titlesize": "large",
     "axes.titleweight": "bold",
     "axes.titlelocation": "left",
@@ -72,8 +74,8 @@ class PictureSettings:
     title: str | None = None
 
     def titled(self, title: str) -> str:
-        """The title to draw where the picture's own is ``title``."""
-        return title if self.title is None else self.title
+        """The title to draw where the picture's own is ``title``; control characters as their codes."""
+        return printable(title if self.title is None else self.title)
 
 
 PLAIN = PictureSettings()
@@ -104,7 +106,9 @@ def render(draw: Callable[[Figure], None], size: tuple[float, float], settings: 
         if settings.size is not None and settings.size[0] < size[0]:
             _thin(figure, settings.size[0] / size[0])
         buffer = io.BytesIO()
-        figure.savefig(buffer, format=settings.format.value, metadata=_METADATA[settings.format])
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", "Glyph")  # a name in a script that the font lacks is drawn as boxes
+            figure.savefig(buffer, format=settings.format.value, metadata=_METADATA[settings.format])
     return buffer.getvalue()
 
 

@@ -48,12 +48,13 @@ def export_command(
     """Write a run in the format of another tool."""
     from semslam.datasets.trajectory_formats import TrajectoryFormat, write_poses
     from semslam.runs.files import writing
+    from semslam.runs.manifest import check_output
 
     place = out_path or source.with_name(f"{source.resolve().stem}-{target}{SUFFIXES.get(target, '')}")
     if target.value in {form.value for form in TrajectoryFormat}:
         trajectory = _trajectory(source, rate)
+        check_output(place)
         with writing(place):
-            place.parent.mkdir(parents=True, exist_ok=True)
             write_poses(place, trajectory, TrajectoryFormat(target.value))
         out.print(f"{len(trajectory)} poses: {place}", soft_wrap=True)
         return
@@ -65,6 +66,7 @@ def export_command(
     if target is Target.EVO:
         from semslam.runs.export.evo import write_evo_result
 
+        check_output(place)
         write_evo_result(run, place)
         out.print(f"evo's result: {place}", soft_wrap=True)
     else:

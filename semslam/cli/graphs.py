@@ -64,7 +64,10 @@ def graph_command(
     from semslam.backend.analysis.judge import judge_graph
     from semslam.backend.graph.g2o import read_g2o, write_g2o
     from semslam.backend.graph.keys import key_name
+    from semslam.runs.manifest import check_output
 
+    if out_file is not None:
+        check_output(out_file)
     graph = read_g2o(file)
     remarks(graph.notes)
     backend = options.settings(config, overrides).backend

@@ -55,7 +55,10 @@ def map_command(
 def diff_command(
     before: Annotated[Path, typer.Argument(metavar="RUN_A", help="The run folder of the earlier visit.")],
     after: Annotated[Path | None, typer.Argument(metavar="[RUN_B]", help="The later one's.")] = None,
-    at: Annotated[float | None, typer.Option("--at", help="Compare one run before and after this stamp, s.")] = None,
+    at: Annotated[
+        float | None,
+        typer.Option("--at", callback=options.finite_or_none, help="Compare one run before and after this stamp, s."),
+    ] = None,
     voxel: Voxel = None,
     out_file: Annotated[Path | None, typer.Option("--out", help="Write the changes as JSON.")] = None,
     as_json: options.Json = False,
@@ -63,13 +66,13 @@ def diff_command(
     """Find objects that moved, disappeared or appeared between two runs, or two parts of one."""
     from semslam.runs.alignment import align_runs
     from semslam.runs.differences import change_values, find_changes, write_changes
-    from semslam.runs.files import check_place
+    from semslam.runs.manifest import check_output
     from semslam.runs.saved_views import open_saved
 
     if (after is None) is (at is None):
         raise ConfigError("Name a second run, or with --at the stamp that parts the passes of one.")
     if out_file is not None:
-        check_place(out_file.parent)
+        check_output(out_file)
     first = open_saved(before)
     if after is None:
         first, second, T_first_second = first.between(-inf, at or 0.0), first.between(at or 0.0, inf), None
@@ -109,9 +112,12 @@ def view_command(
 ) -> None:
     """Show a saved run in the viewer."""
     from semslam.runs.playback import has_semantic_map, play
+    from semslam.runs.manifest import check_output
     from semslam.runs.saved_views import open_saved
     from semslam.viewers.rerun_stream import open_viewer
 
+    if file is not None:
+        check_output(file)
     saved = open_saved(run, sequence)
     semantic = has_semantic_map(run)
     viewer = open_viewer(run.resolve().name, file, live=file is None, finished=True, semantic=semantic)

@@ -44,6 +44,8 @@ def merge_command(
     from semslam.runs.recording import read_front_end
     from semslam.runtime.stopping import stop_on_signals
 
+    if out_directory is not None and out_directory.resolve() in (first.resolve(), second.resolve()):
+        raise ConfigError(f"{out_directory} is one of the runs that are merged; name another folder with --out.")
     saved = [read_front_end(first), read_front_end(second)]
     if sequences and len(sequences) != len(saved):
         raise ConfigError("Give --sequence twice, once for each run.")

@@ -57,9 +57,14 @@ def plot_command(
     """Draw the pictures of a saved run for a paper; of several runs, one picture with all of them."""
     from semslam.runs.comparison import write_comparison_plots
     from semslam.runs.files import check_place, writing
+    from semslam.runs.manifest import run_around
     from semslam.runs.presentation import write_plots
     from semslam.runs.results import read_run
 
+    if run_around(out_directory / "picture") is not None:
+        raise ConfigError(
+            f"{out_directory} belongs to a run, whose pictures 'semslam report' draws; name another folder."
+        )
     wanted = _settings(formats, size, font, font_size, title)
     saved = [read_run(run) for run in runs]
     check_place(out_directory)

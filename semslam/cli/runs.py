@@ -163,9 +163,12 @@ def viewing(name: str, file: Path | None, live: bool) -> Iterator["Viewer | None
     if file is None and not live:
         yield None
         return
+    from semslam.runs.manifest import check_output
     from semslam.viewers.background import BackgroundViewer
     from semslam.viewers.rerun_stream import check_place, open_viewer
 
+    if file is not None:
+        check_output(file)
     check_place(file)
     with closing(BackgroundViewer(partial(open_viewer, name, file, live), remark)) as viewer:
         yield viewer

@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from semslam import __version__
 from semslam.errors import ResultsError
 from semslam.runs.checkout import commit
-from semslam.runs.files import sync
+from semslam.runs.files import check_place, sync, writing
 
 MANIFEST, METRICS = "manifest.json", "metrics.json"
 UNFINISHED = ".unfinished"
@@ -91,6 +91,27 @@ def foreign_files(directory: Path) -> list[str]:
     except ResultsError:
         ours = set()
     return [name for name in found if name not in ours]
+
+
+def check_output(path: Path) -> None:
+    """Check before long work that a file can be written and belongs to no run; its folder is made.
+
+    Raises:
+        ResultsError: it cannot, or it does.
+    """
+    with writing(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        check_place(path.parent)
+        if path.is_dir():
+            raise ResultsError(f"{path} is a folder; name a file.")
+        run = run_around(path)
+        if run is not None and path.exists() and str(path.resolve().relative_to(run)) not in foreign_files(run):
+            raise ResultsError(f"{path} belongs to the run in {run}; name another file.")
+
+
+def run_around(path: Path) -> Path | None:
+    """The run folder in which a path lies, or None."""
+    return next((folder for folder in path.resolve().parents if (folder / MANIFEST).is_file()), None)
 
 
 def seal(directory: Path, metrics: str, command: Sequence[str] | None = None) -> None:
