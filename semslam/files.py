@@ -1,9 +1,13 @@
-"""Files from outside, read within limits: regular files alone, no more bytes than a reader expects."""
+"""Files from outside, read within limits: regular files alone, no more bytes than a reader expects; and files and
+folders that are written whole or not at all.
+"""
 
 import contextlib
 import os
+import shutil
 import stat
 import zipfile
+from collections.abc import Iterator
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -86,22 +90,53 @@ def read_arrays(
     raise error(f"{what} {path} cannot be read: unpacked it has more than {limit / 1e6:.0f} MB.")
 
 
+@contextlib.contextmanager
+def replaced(path: Path) -> Iterator[Path]:
+    """A neighbour file to write, which takes the file's name at the end; else nothing is left of it."""
+    partial = path.with_name(f".{path.name}.partial")
+    try:
+        yield partial
+        partial.replace(path)
+    except BaseException:
+        with contextlib.suppress(OSError, ValueError):
+            partial.unlink()
+        raise
+
+
+@contextlib.contextmanager
+def filled_folder(path: Path) -> Iterator[Path]:
+    """A folder to fill, which takes the name at the end, or whose content goes into the empty folder of that name.
+
+    Nothing is left of it where the block is ended by an error or a signal.
+    """
+    is_there = path.is_dir()
+    partial = path / ".partial" if is_there else path.with_name(f".{path.name}.{os.getpid()}.partial")
+    partial.mkdir(parents=True)
+    try:
+        yield partial
+        if is_there:
+            for child in sorted(partial.iterdir()):
+                child.rename(path / child.name)
+            partial.rmdir()
+        else:
+            partial.rename(path)
+    except BaseException:
+        shutil.rmtree(partial, ignore_errors=True)
+        raise
+
+
 def write_whole(path: Path, data: bytes, error: type[SemslamError]) -> None:
     """Write a file through a neighbour, so that it is whole or as it was, and outlives a power cut.
 
     Raises:
         SemslamError: an ``error`` in one sentence.
     """
-    partial = path.with_name(f".{path.name}.partial")
     try:
-        with partial.open("wb") as stream:
+        with replaced(path) as partial, partial.open("wb") as stream:
             stream.write(data)
             stream.flush()
             os.fsync(stream.fileno())
-        partial.replace(path)
     except (OSError, ValueError) as reason:
-        with contextlib.suppress(OSError, ValueError):
-            partial.unlink()
         text = (reason.strerror or str(reason)) if isinstance(reason, OSError) else "its name is not usable"
         raise error(f"{path} cannot be written: {text}.") from reason
 

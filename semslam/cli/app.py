@@ -27,7 +27,7 @@ from semslam.cli import (
 )
 from semslam.cli.console import complain, remark, shown
 from semslam.errors import SemslamError, SemslamWarning
-from semslam.runtime.stopping import Ended
+from semslam.runtime.stopping import Ended, end_on_signals
 
 INTERRUPTED = 130
 FAILED = 2
@@ -83,7 +83,7 @@ def _show_warning(
 def main() -> None:
     """Run the command line; what a user can correct ends in one sentence and exit code 2, Ctrl-C in 130."""
     try:
-        with warnings.catch_warnings():
+        with warnings.catch_warnings(), end_on_signals():
             warnings.showwarning = _show_warning
             app()
     except SemslamError as error:
@@ -95,6 +95,12 @@ def main() -> None:
     except KeyboardInterrupt:
         complain("Interrupted.")
         sys.exit(INTERRUPTED)
+    except ImportError as error:
+        ended = _interruption(error)
+        if ended is None:
+            raise
+        complain("Interrupted.")
+        sys.exit(ended.exit_code if isinstance(ended, Ended) else INTERRUPTED)
     except BrokenPipeError:
         # The reader of a pipe has gone; print nothing more, not even while Python closes standard output.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -105,3 +111,11 @@ def main() -> None:
     except MemoryError:
         complain("There is not enough memory for this; try --max-frames or a larger machine.")
         sys.exit(FAILED)
+
+
+def _interruption(error: BaseException) -> Ended | KeyboardInterrupt | None:
+    """The signal that an import failed of, where that is what it failed of: some libraries hide it."""
+    reason: BaseException | None = error
+    while reason is not None and not isinstance(reason, Ended | KeyboardInterrupt):
+        reason = reason.__cause__ or reason.__context__
+    return reason

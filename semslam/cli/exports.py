@@ -105,6 +105,7 @@ def _trajectory(source: Path, rate: float | None) -> "Trajectory":
 
 
 def _write_images(run: "SavedRun", target: Target, directory: Path, sequence: str | None) -> int:
+    from semslam.files import filled_folder
     from semslam.runs.export.colmap import COLMAP
     from semslam.runs.export.nerfstudio import NERFSTUDIO
     from semslam.runs.export.posed_images import write_model
@@ -115,8 +116,8 @@ def _write_images(run: "SavedRun", target: Target, directory: Path, sequence: st
     with writing(directory):
         if directory.exists() and any(directory.iterdir()):
             raise ResultsError(f"{directory} is not empty; name another folder with --out.")
-        directory.mkdir(parents=True, exist_ok=True)
-        return write_model(run, dataset, directory, COLMAP if target is Target.COLMAP else NERFSTUDIO)
+        with filled_folder(directory) as work:
+            return write_model(run, dataset, work, COLMAP if target is Target.COLMAP else NERFSTUDIO)
 
 
 COMMANDS = (

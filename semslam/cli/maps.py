@@ -111,8 +111,8 @@ def view_command(
     sequence: Sequence = None,
 ) -> None:
     """Show a saved run in the viewer."""
-    from semslam.runs.playback import has_semantic_map, play
     from semslam.runs.manifest import check_output
+    from semslam.runs.playback import has_semantic_map, play
     from semslam.runs.saved_views import open_saved
     from semslam.viewers.rerun_stream import open_viewer
 

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from semslam.errors import ResultsError
+from semslam.files import replaced
 
 
 @contextlib.contextmanager
@@ -28,10 +29,8 @@ def reason(error: OSError) -> str:
 
 def write_json(path: Path, value: object) -> None:
     """Write JSON through a neighbour file, so that the file is whole or not there."""
-    with writing(path):
-        partial = path.with_name(f".{path.name}.partial")
+    with writing(path), replaced(path) as partial:
         partial.write_text(json.dumps(value, indent=2, allow_nan=False) + "\n", encoding="utf-8")
-        partial.replace(path)
 
 
 def check_place(directory: Path) -> None:

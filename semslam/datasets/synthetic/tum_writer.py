@@ -11,6 +11,7 @@ from semslam.datasets.cameras import TUM_DEPTH_SCALE, WRITTEN
 from semslam.datasets.dataset import Dataset
 from semslam.datasets.tum_format import write_trajectory
 from semslam.errors import DatasetError
+from semslam.files import filled_folder
 from semslam.types import Float32Array, UInt8Array
 
 JPEG_QUALITY = 95
@@ -39,23 +40,34 @@ def write_tum(
     try:
         if folder.exists() and any(folder.iterdir()):
             raise DatasetError(f"The folder {folder} is not empty; a sequence needs one of its own.")
-        for name in ("rgb", "depth", *(("labels",) if labels else ())):
-            (folder / name).mkdir(parents=True, exist_ok=True)
-        lists = {name: [f"# timestamp filename, {WRITTEN}"] for name in ("rgb", "depth")}
-        for frame in dataset:
-            stamp = f"{frame.timestamp:.9f}"
-            color, depth = f"rgb/{stamp}.{'jpg' if jpeg else 'png'}", f"depth/{stamp}.png"
-            write_color(folder / color, frame.color)
-            write_depth(folder / depth, frame.depth)
-            if labels:
-                _write_image(folder / f"labels/{frame.index:06d}.png", labels(frame.index))
-            lists["rgb"].append(f"{stamp} {color}")
-            lists["depth"].append(f"{stamp} {depth}")
-            report(frame.index + 1, len(dataset))
-        for name, lines in lists.items():
-            (folder / f"{name}.txt").write_text("\n".join([*lines, ""]), encoding="utf-8")
+        with filled_folder(folder) as work:
+            _fill(work, dataset, jpeg, labels, report)
     except OSError as error:
         raise DatasetError(f"The sequence cannot be written to {folder}: {error.strerror}.") from error
+
+
+def _fill(
+    folder: Path,
+    dataset: Dataset,
+    jpeg: bool,
+    labels: Callable[[int], UInt8Array] | None,
+    report: Callable[[int, int], None],
+) -> None:
+    for name in ("rgb", "depth", *(("labels",) if labels else ())):
+        (folder / name).mkdir()
+    lists = {name: [f"# timestamp filename, {WRITTEN}"] for name in ("rgb", "depth")}
+    for frame in dataset:
+        stamp = f"{frame.timestamp:.9f}"
+        color, depth = f"rgb/{stamp}.{'jpg' if jpeg else 'png'}", f"depth/{stamp}.png"
+        write_color(folder / color, frame.color)
+        write_depth(folder / depth, frame.depth)
+        if labels:
+            _write_image(folder / f"labels/{frame.index:06d}.png", labels(frame.index))
+        lists["rgb"].append(f"{stamp} {color}")
+        lists["depth"].append(f"{stamp} {depth}")
+        report(frame.index + 1, len(dataset))
+    for name, lines in lists.items():
+        (folder / f"{name}.txt").write_text("\n".join([*lines, ""]), encoding="utf-8")
     write_camera(folder / CAMERA_FILE, dataset.intrinsics, TUM_DEPTH_SCALE)
     if dataset.ground_truth is not None:
         write_trajectory(folder / "groundtruth.txt", dataset.ground_truth)

@@ -4,6 +4,7 @@ from pathlib import Path
 
 from semslam.errors import TrajectoryError
 from semslam.eval.trajectory import MAX_DIFFERENCE, associate
+from semslam.files import replaced
 from semslam.runs.files import writing
 from semslam.runs.results import SavedRun
 
@@ -33,7 +34,5 @@ def write_evo_result(run: SavedRun, path: Path) -> None:
     )
     truth.name, estimate.name = f"{run.metrics.sequence} truth", label
     result = ape(truth, estimate, PoseRelation.translation_part, align=True)
-    partial = path.with_name(f".{path.name}.part")
-    with writing(path):
+    with writing(path), replaced(path) as partial:
         save_res_file(str(partial), result)
-        partial.replace(path)

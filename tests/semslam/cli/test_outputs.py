@@ -9,7 +9,9 @@ from semslam.datasets.tum_format import write_trajectory
 from semslam.errors import ResultsError
 from semslam.eval.report.plots import RunDrawing, draw_run
 from semslam.eval.style import PictureSettings
+from semslam.files import filled_folder
 from semslam.runs.manifest import check_output, run_around, seal
+from semslam.runtime.stopping import Ended
 from semslam.types import Trajectory
 from tests.conftest import Call
 
@@ -59,3 +61,37 @@ def test_any_name_can_be_a_title() -> None:
     for title in (r"$\frac{$", "\x1b[31mred\x00", "漢字"):
         drawing = RunDrawing(title, LINE, LINE, None, ())
         assert draw_run(drawing, PictureSettings(title=title))
+
+
+@pytest.mark.parametrize("there", [False, True])
+def test_a_folder_is_whole_or_not_there(tmp_path: Path, there: bool) -> None:
+    target = tmp_path / "sequence"
+    if there:
+        target.mkdir()
+    with pytest.raises(KeyboardInterrupt), filled_folder(target) as work:
+        (work / "rgb").mkdir()
+        raise KeyboardInterrupt
+    assert [path.name for path in tmp_path.rglob("*")] == (["sequence"] if there else [])
+    with filled_folder(target) as work:
+        (work / "rgb").mkdir()
+    assert [path.name for path in target.iterdir()] == ["rgb"]
+
+
+def test_a_sequence_that_cannot_be_converted_leaves_nothing(semslam: Call, tmp_path: Path) -> None:
+    scene = "synthetic:room?frames=4&width=64"
+    assert semslam("convert", scene, tmp_path / "a").code == 0
+    sorted((tmp_path / "a" / "depth").iterdir())[1].write_bytes(b"no image")
+    assert semslam("convert", tmp_path / "a", tmp_path / "b").code == 2
+    assert [path.name for path in tmp_path.iterdir()] == ["a"]
+
+
+@pytest.mark.parametrize(("reason", "code"), [(KeyboardInterrupt(), 130), (Ended(15), 143)])
+def test_a_signal_that_a_library_hides_while_it_is_imported(
+    semslam: Call, monkeypatch: pytest.MonkeyPatch, reason: BaseException, code: int
+) -> None:
+    def fail(*_: object) -> None:
+        raise ImportError("initialization failed") from reason
+
+    monkeypatch.setattr("semslam.cli.app.app", fail)
+    outcome = semslam("doctor")
+    assert (outcome.code, outcome.err.strip()) == (code, "semslam: Interrupted.")
