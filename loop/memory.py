@@ -13,10 +13,12 @@ class LoopMemory:
     Attributes:
         keyframes: ascending by id.
         looks: what the detector has kept of them.
+        closed: query and match of the verified loops between them.
     """
 
     keyframes: tuple[Keyframe, ...]
     looks: tuple[Look, ...]
+    closed: tuple[tuple[int, int], ...] = ()
 
     def renumbered(self) -> "LoopMemory":
         """The same with ids that count from 0; a map that is one keyframe's own is numbered as it is."""
@@ -26,6 +28,7 @@ class LoopMemory:
                 replace(k, id=place[k.id], map_id=place[k.id] if k.map_id == k.id else k.map_id) for k in self.keyframes
             ),
             tuple(replace(look, id=place[look.id]) for look in self.looks if look.id in place),
+            tuple((place[a], place[b]) for a, b in self.closed if a in place and b in place),
         )
 
 

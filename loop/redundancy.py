@@ -1,6 +1,6 @@
 """Loops that would repeat what loops between neighbouring keyframes have closed already."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from semslam.types import Keyframe, LoopConstraint
 
@@ -20,7 +20,17 @@ class ClosedPlaces:
 
     def note(self, loop: LoopConstraint) -> None:
         """Take in a verified loop."""
-        self._matches.setdefault(loop.query, []).append(loop.match)
+        self.recall([(loop.query, loop.match)])
+
+    @property
+    def pairs(self) -> tuple[tuple[int, int], ...]:
+        """Query and match of each loop that was noted."""
+        return tuple((query, match) for query, matches in self._matches.items() for match in matches)
+
+    def recall(self, pairs: Iterable[tuple[int, int]]) -> None:
+        """Take in loops by query and match."""
+        for query, match in pairs:
+            self._matches.setdefault(query, []).append(match)
 
     def joins(self, query: int, match: int) -> bool:
         """Whether a verified loop is between these two keyframes."""

@@ -139,7 +139,7 @@ class LoopSearch:
             ConfigError: the detector cannot hand it out.
         """
         kept = tuple(keyframe for keyframe in self._keyframes if keyframe.id not in self._forgotten)
-        return LoopMemory(kept, self._remembering.looks())
+        return LoopMemory(kept, self._remembering.looks(), self._closed.pairs)
 
     def recall(self, memory: LoopMemory) -> None:
         """Take the keyframes of another search, before the first of its own; their ids count from 0.
@@ -156,6 +156,7 @@ class LoopSearch:
         for keyframe in memory.keyframes:
             self._follower.add(keyframe, self._keyframes[-1] if self._keyframes else None)
             self._keyframes.append(keyframe)
+        self._closed.recall(memory.closed)
 
     @property
     def _remembering(self) -> Remembering:

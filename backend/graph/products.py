@@ -94,6 +94,11 @@ class GraphSolution:
     covisible: tuple[Edge, ...] = ()
 
     @property
+    def component_of(self) -> dict[int, int]:
+        """For each key the place of its component in ``components``."""
+        return {key: place for place, keys in enumerate(self.components) for key in keys}
+
+    @property
     def odometry(self) -> tuple[Edge, ...]:
         """Odometry's edges, as they were stated."""
         return self.edges[: len(self.edges) - self._accepted]

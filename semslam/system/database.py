@@ -85,6 +85,7 @@ def write_database(path: Path, database: LoopDatabase) -> None:
         "poses": np.array([keyframe.T_odom_cam for keyframe in keyframes]).reshape(-1, 4, 4),
         "stamps": np.array([keyframe.timestamp for keyframe in keyframes], dtype=np.float64),
         "maps": np.array([keyframe.map_id for keyframe in keyframes], dtype=np.int64),
+        "closed": np.array(database.memory.closed, dtype=np.int64).reshape(-1, 2),
         "look_ids": np.array([look.id for look in looks], dtype=np.int64),
         "look_stamps": np.array([look.timestamp for look in looks], dtype=np.float64),
     }
@@ -157,7 +158,15 @@ def _read(header: Mapping[str, Any], arrays: Mapping[str, AnyArray]) -> LoopData
         for number in range(count)
     )
     source = MemorySource(str(header["detector"]), str(header["settings"]))
-    return LoopDatabase(source, keys, LoopMemory(keyframes, _looks(arrays, count)))
+    return LoopDatabase(source, keys, LoopMemory(keyframes, _looks(arrays, count), _closed(arrays, count)))
+
+
+def _closed(arrays: Mapping[str, AnyArray], count: int) -> tuple[tuple[int, int], ...]:
+    """Query and match of each loop; files of before 2026-11-29 have none."""
+    pairs = arrays.get("closed", np.zeros((0, 2), dtype=np.int64))
+    if pairs.ndim != 2 or pairs.shape[1] != 2 or not ((pairs >= 0) & (pairs < count)).all():
+        raise ValueError("loops of no keyframe")
+    return tuple((int(query), int(match)) for query, match in pairs)
 
 
 def _looks(arrays: Mapping[str, AnyArray], count: int) -> tuple[Look, ...]:

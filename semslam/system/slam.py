@@ -202,7 +202,8 @@ class Slam:
                 solution = refine(solution, self._keyframes, self._observations, self._config)
             except GraphError as error:
                 notes.append(f"{error} The poses are those of the pose graph.")
-        components = self._components(solution)
+        component_of = solution.component_of
+        components = {keyframe.map_id: component_of[keyframe.id] for keyframe in self._keyframes}
         unplaced = len(solution.components)
         return SlamResult(
             frames=tuple(self._frames),
@@ -297,8 +298,3 @@ class Slam:
             self._keyframes,
             solution.poses,
         )
-
-    def _components(self, solution: GraphSolution) -> dict[int, int]:
-        """For each map of the odometry the place of its component in ``solution.components``, the largest first."""
-        place = {key: index for index, keys in enumerate(solution.components) for key in keys}
-        return {keyframe.map_id: place[keyframe.id] for keyframe in self._keyframes}

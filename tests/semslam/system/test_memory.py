@@ -123,6 +123,19 @@ def test_a_saved_closer_goes_on_as_the_first_would_have(room, frames, worker, tm
     second.close()
 
 
+def test_a_loaded_closer_knows_which_places_are_closed(room, frames, tmp_path):
+    first, second = make(room), make(room)
+    add(first, frames[:6])
+    factors = add(first, [frames[2]], 20)
+    first.save(tmp_path / "first.npz")
+    numbers = {X(number): number for number in range(6)} | {X(20): 6}
+    closed = read_database(tmp_path / "first.npz").memory.closed
+    assert set(closed) == {(numbers[query], numbers[match]) for match, query in ends(factors)}
+    second.load(tmp_path / "first.npz")
+    second.save(tmp_path / "second.npz")
+    assert (tmp_path / "second.npz").read_bytes() == (tmp_path / "first.npz").read_bytes()
+
+
 def test_equal_closers_are_equal_bytes_and_an_empty_one_can_be_saved(room, frames, tmp_path):
     for name in ("a", "b"):
         closer = make(room)
