@@ -1,6 +1,7 @@
 """semslam map, diff, view."""
 
 import json
+from contextlib import AbstractContextManager, nullcontext
 from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -35,17 +36,16 @@ def map_command(
 ) -> None:
     """Make the maps of a saved run again from its keyframes' images."""
     from semslam.runs.files import check_place
-    from semslam.runs.manifest import seal_again
+    from semslam.runs.manifest import resealing
     from semslam.runs.mapping import MapRequest, write_maps
     from semslam.runs.saved_views import open_saved
 
     saved = open_saved(run, sequence)
     directory = out_directory or run
     check_place(directory)
-    with bar(f"{saved.dataset.name} map", None, "keyframes") as update:
-        written = write_maps(saved, MapRequest(voxel, mesh, semantic), directory, update)
-    if out_directory is None:
-        seal_again(run)
+    sealed: AbstractContextManager[list[Path]] = nullcontext([]) if out_directory is not None else resealing(run)
+    with sealed as written, bar(f"{saved.dataset.name} map", None, "keyframes") as update:
+        written.extend(write_maps(saved, MapRequest(voxel, mesh, semantic), directory, update))
     for path in written:
         out.print(f"Written: {path}", soft_wrap=True)
     if semantic and out_directory is None:

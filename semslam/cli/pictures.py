@@ -27,7 +27,7 @@ def report_command(
     """Write the plots and the report of a saved run or comparison again."""
     from semslam.runs.comparison import is_comparison, present_comparison
     from semslam.runs.files import check_place, writing
-    from semslam.runs.manifest import seal_again
+    from semslam.runs.manifest import resealing
     from semslam.runs.presentation import present
     from semslam.runs.results import read_run
     from semslam.runs.saved_views import find_images
@@ -40,8 +40,8 @@ def report_command(
             dataset, problem = find_images(run, sequence)
             if problem is not None:
                 remark(f"The report goes without images: {problem}")
-            present(read_run(run), dataset)
-            seal_again(run)
+            with resealing(run) as written:
+                written.extend(present(read_run(run), dataset))
     out.print(f"Written: {run / 'report.html'}", soft_wrap=True)
 
 

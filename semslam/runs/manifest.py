@@ -1,7 +1,10 @@
 """The manifest of a run folder: it marks the folder as ours, and holds size and checksum of every file in it."""
 
+import contextlib
+import fcntl
 import hashlib
-from collections.abc import Sequence
+import os
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Literal
 
@@ -9,6 +12,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from semslam import __version__
 from semslam.errors import ResultsError
+from semslam.files import replaced
 from semslam.runs.checkout import commit
 from semslam.runs.files import check_place, sync, writing
 
@@ -122,28 +126,11 @@ def seal(directory: Path, metrics: str, command: Sequence[str] | None = None) ->
         metrics: the text of ``metrics.json``.
         command: the command line.
     """
-    origin = Manifest(commit=commit(), command=None if command is None else tuple(command), files={})
-    _seal(directory, metrics, origin)
-
-
-def seal_again(directory: Path) -> None:
-    """Update the manifest of a finished run after files were added or rewritten.
-
-    Version, commit and command line stay those of the run.
-
-    Raises:
-        ResultsError: it is no run folder, or its manifest is damaged.
-    """
-    origin = read_manifest(directory)
-    _seal(directory, (directory / METRICS).read_text(encoding="utf-8"), origin)
-
-
-def _seal(directory: Path, metrics: str, origin: Manifest) -> None:
     last = {directory / MANIFEST, directory / METRICS}
     paths = [path for path in sorted(directory.rglob("*")) if not _is_folder(path) and path not in last]
     files = {str(path.relative_to(directory)): _record(path.read_bytes()) for path in paths}
     files[METRICS] = _record(metrics.encode())
-    manifest = origin.model_copy(update={"files": files})
+    manifest = Manifest(commit=commit(), command=None if command is None else tuple(command), files=files)
     manifest = manifest.model_copy(update={"checksum": manifest.digest()})
     (directory / MANIFEST).write_text(manifest.model_dump_json(indent=2) + "\n", encoding="utf-8")
     for path in (*paths, directory / MANIFEST):
@@ -151,6 +138,41 @@ def _seal(directory: Path, metrics: str, origin: Manifest) -> None:
     (directory / METRICS).write_text(metrics, encoding="utf-8")
     sync(directory / METRICS)
     sync(directory)
+
+
+@contextlib.contextmanager
+def resealing(directory: Path) -> Iterator[list[Path]]:
+    """Add files to a finished run, or rewrite some: the block lists which, and the manifest follows.
+
+    All other records stay: damage done elsewhere stays visible, and a file that no run wrote stays somebody else's.
+    Version, commit and command line stay those of the run. Blocks of several processes follow one another.
+
+    Raises:
+        ResultsError: it is no run folder, or its manifest is damaged.
+    """
+    with _locked(directory):
+        before = read_manifest(directory)
+        written: list[Path] = []
+        yield written
+        records = {str(path.relative_to(directory)): _record(path.read_bytes()) for path in written}
+        after = before.model_copy(update={"files": dict(sorted((before.files | records).items()))})
+        after = after.model_copy(update={"checksum": after.digest()})
+        with writing(directory), replaced(directory / MANIFEST) as partial:
+            partial.write_text(after.model_dump_json(indent=2) + "\n", encoding="utf-8")
+            for path in (*written, partial):
+                sync(path)
+
+
+@contextlib.contextmanager
+def _locked(directory: Path) -> Iterator[None]:
+    """Within the block no other process changes the files of a run."""
+    with writing(directory):
+        descriptor = os.open(directory, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(descriptor)
 
 
 def _read(directory: Path) -> Manifest:

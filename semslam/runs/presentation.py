@@ -24,15 +24,17 @@ from semslam.runs.results import SavedRun
 from semslam.runs.semantic_section import semantic_section
 
 
-def present(run: SavedRun, dataset: Dataset | None) -> None:
-    """Write ``plots/*.png`` and ``report.html`` into a run folder.
+def present(run: SavedRun, dataset: Dataset | None) -> list[Path]:
+    """Write ``plots/*.png`` and ``report.html`` into a run folder, and return their paths.
 
     Args:
         run: the saved run.
         dataset: the images are read from it again; None = the page goes without.
     """
-    write_plots(run, run.directory / "plots")
-    (run.directory / "report.html").write_text(make_report(run_report(run, dataset)), encoding="utf-8")
+    page = run.directory / "report.html"
+    pictures = write_plots(run, run.directory / "plots")
+    page.write_text(make_report(run_report(run, dataset)), encoding="utf-8")
+    return [*pictures, page]
 
 
 def write_plots(run: SavedRun, directory: Path, settings: PictureSettings = PLAIN) -> list[Path]:

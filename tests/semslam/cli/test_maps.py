@@ -11,7 +11,7 @@ import pytest
 from semslam.config import Config
 from semslam.datasets import open_dataset
 from semslam.maps.semantic.saved import read_semantic_map
-from semslam.runs.manifest import seal_again
+from semslam.runs.manifest import seal
 from semslam.runs.pipeline import run
 from semslam.runs.results import write_run
 from tests.conftest import Call
@@ -82,7 +82,7 @@ def test_a_map_needs_a_run_and_its_images(semslam: Call, saved: Path, tmp_path: 
     assert "not the sequence of the saved run" in outcome.err
     shutil.copytree(saved, tmp_path / "moved")
     (tmp_path / "moved" / "sequence.txt").unlink()
-    seal_again(tmp_path / "moved")
+    seal(tmp_path / "moved", (tmp_path / "moved" / "metrics.json").read_text())
     outcome = semslam("map", tmp_path / "moved")
     assert outcome.code == 2
     assert "--sequence" in outcome.err

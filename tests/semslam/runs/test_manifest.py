@@ -10,7 +10,7 @@ import pytest
 from semslam.config import Config
 from semslam.errors import ResultsError
 from semslam.runs.checkout import commit
-from semslam.runs.manifest import Manifest, read_manifest, seal, seal_again
+from semslam.runs.manifest import Manifest, foreign_files, read_manifest, resealing, seal
 from semslam.runs.pipeline import run
 from semslam.runs.recording import read_front_end
 from semslam.runs.results import READ, read_ledger, read_run, write_run
@@ -90,11 +90,28 @@ def test_a_run_knows_its_commit_and_keeps_its_origin_when_files_are_added(tmp_pa
     seal(tmp_path, "{}", ("semslam", "run", "room"))
     before = read_manifest(tmp_path)
     assert before.commit == commit()
-    (tmp_path / "mesh.ply").write_text("mesh")
-    seal_again(tmp_path)
+    with resealing(tmp_path) as written:
+        (tmp_path / "mesh.ply").write_text("mesh")
+        written.append(tmp_path / "mesh.ply")
     after = read_manifest(tmp_path)
     assert "mesh.ply" in after.files
     assert (after.version, after.commit, after.command) == (before.version, before.commit, before.command)
+
+
+def test_adding_files_hides_no_damage_and_takes_nobody_else_s_file(tmp_path: Path) -> None:
+    for name in ("graph.g2o", "report.html"):
+        (tmp_path / name).write_text(name)
+    seal(tmp_path, "{}")
+    (tmp_path / "thesis.tex").write_text("mine")
+    (tmp_path / "graph.g2o").write_text("damaged")
+    with resealing(tmp_path) as written:
+        (tmp_path / "report.html").write_text("again")
+        written.append(tmp_path / "report.html")
+    manifest = read_manifest(tmp_path)
+    manifest.check(tmp_path, "report.html")
+    with pytest.raises(ResultsError, match=r"graph\.g2o is damaged"):
+        manifest.check(tmp_path, "graph.g2o")
+    assert foreign_files(tmp_path) == ["thesis.tex"]
 
 
 def test_a_manifest_of_a_version_that_knew_of_no_commit_is_read() -> None:
