@@ -23,8 +23,12 @@ NEAR = 5
 """Keyframes that count as the same place, in time."""
 CLEARLY = 3
 """How many times as many loops a group needs to outweigh another one."""
-NEARER = 2.0
-"""How many times as far from odometry a group must lie to be outweighed by another one."""
+NEARER = 1.5
+"""How many times as far from odometry a group must lie to be outweighed by another one: that much of it may be an error
+of the stated covariances."""
+STRONG = 6.0
+"""By how much its squared distance must be larger besides: odometry then is 20 times as likely with the other one, strong
+evidence by Kass and Raftery (1995)."""
 ALONE = 1.5
 """How many times the limit a pair must be off that alone sets two groups apart: one in a thousand is off by chance."""
 UNIT = 1.0
@@ -158,9 +162,13 @@ def _outweighs(size: int, distance: float, other_size: int, other_distance: floa
     larger = size >= CLEARLY * other_size
     if larger and other_size < CLEARLY:
         return True
-    nearer = NEARER * distance <= other_distance
-    farther = distance >= NEARER * other_distance
-    return (nearer and CLEARLY * size >= other_size) or (larger and not farther)
+    nearer = _is_nearer(distance, other_distance)
+    return (nearer and CLEARLY * size >= other_size) or (larger and not _is_nearer(other_distance, distance))
+
+
+def _is_nearer(distance: float, other_distance: float) -> bool:
+    """Whether odometry prefers the first of two distances, even if it states too small a covariance."""
+    return NEARER * distance <= other_distance and other_distance**2 - distance**2 >= STRONG
 
 
 def _sharing_a_place(loops: Sequence[Edge]) -> tuple[IntArray, IntArray, BoolArray]:

@@ -106,6 +106,13 @@ def test_where_odometry_cannot_tell_all_sides_are_withheld():
     assert set(screen_loops(drifting_chain(rng, 2.15), [*true, *false], 4.7, 1.5).reasons) == {"ambiguous"}
 
 
+def test_true_loops_stand_where_odometry_has_drifted_by_two_fifths_of_the_way_to_the_twin():
+    rng = np.random.default_rng(2)
+    true, false = loops_of(rng)
+    found = screen_loops(drifting_chain(rng, 1.8), [*true, *false], 4.7, 1.5)
+    assert found.reasons == (*(None,) * 15, *("ambiguous",) * 30)
+
+
 def test_loops_that_odometry_supports_stand_against_a_twin_within_reach():
     rng = np.random.default_rng(3)
     true, false = loops_of(rng)
