@@ -27,8 +27,8 @@ NEARER = 1.5
 """How many times as far from odometry a group must lie to be outweighed by another one: that much of it may be an error
 of the stated covariances."""
 STRONG = 6.0
-"""By how much its squared distance must be larger besides: odometry then is 20 times as likely with the other one, strong
-evidence by Kass and Raftery (1995)."""
+"""By how much its squared distance must be larger besides: odometry is 20 times as likely with the other one then,
+strong evidence by Kass and Raftery (1995)."""
 ALONE = 1.5
 """How many times the limit a pair must be off that alone sets two groups apart: one in a thousand is off by chance."""
 UNIT = 1.0
