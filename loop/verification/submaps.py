@@ -82,10 +82,12 @@ class SubmapRegistration:
         there, back = measure_fit(source, target, T, config.near), measure_fit(target, source, invert(T), config.near)
         overlap = min(there.fitness, back.fitness)
         filled = max(_free_space_share(ours, there, match, T), _free_space_share(theirs, back, query, invert(T)))
+        # The less both have seen in common, the surer must be what there is.
+        limit = config.max_free_space if overlap >= config.much_overlap else config.max_free_space_little
         gates = (
             self._stays(T_guess, T),
             Gate(overlap >= config.min_overlap, RejectionReason.LOW_OVERLAP, overlap, config.min_overlap),
-            Gate(filled <= config.max_free_space, RejectionReason.FREE_SPACE, filled, config.max_free_space),
+            Gate(filled <= limit, RejectionReason.FREE_SPACE, filled, limit),
         )
         failed = first_failed(gates)
         if failed is not None:

@@ -16,16 +16,18 @@ class SubmapConfig(Section):
     )
     max_shift: float = setting(0.8, "motion that the registration may add to the guess", unit="m", gt=0)
     max_turn: float = setting(0.35, "rotation that the registration may add to the guess", unit="rad", gt=0)
-    min_points: int = setting(1500, "minimum number of points of each submap", gt=5)
-    min_overlap: float = setting(0.3, "share of either submap that must lie near the other", ge=0, le=1)
+    min_points: int = setting(2500, "minimum number of points of each submap", gt=5)
+    min_overlap: float = setting(0.2, "share of either submap that must lie near the other", ge=0, le=1)
+    much_overlap: float = setting(0.3, "share from which on max_free_space holds", ge=0, le=1)
     near: float = setting(0.1, "distance up to which a point counts as overlapping", unit="m", gt=0)
     min_view_overlap: float = setting(
         0.15, "the same of the two keyframes with their neighbours that a loop is between", ge=0, le=1
     )
+    max_free_space_little: float = setting(0.03, "maximum likewise where less overlaps than that", ge=0, le=1)
     max_free_space: float = setting(
         0.07, "points in the other's free space, as a share of these and the overlapping", ge=0, le=1
     )
-    max_rmse: float = setting(0.035, "maximum root mean square distance of the inliers", unit="m", gt=0)
+    max_rmse: float = setting(0.04, "maximum root mean square distance of the inliers", unit="m", gt=0)
     max_sigma: float = setting(0.25, "maximum standard deviation of the relative position", unit="m", gt=0)
     inflation: float = setting(200.0, "factor on ICP's formal variance, for correlated errors of its points", gt=0)
     sigma_rotation: float = setting(
