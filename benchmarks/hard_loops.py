@@ -12,11 +12,14 @@ above 120. Printed for each detector and kind:
 - closed: share of revisits with a verified loop whose pose is within 0.20 m and 10 degrees; ``off`` counts those of the
   ``verified`` loops that miss this, ``false`` those by over 0.5 m or 20 degrees.
 
+With ``--crowd N`` the scene's keyframes are first entered repeatedly until the database holds N, and only what a
+detector keeps of each and the processor time of a query, description included and segmentation not, are printed.
 With ``--labels`` the scene's exact labels take the network's place. ``--set`` changes settings, as of an ablation.
 """
 
 import argparse
 from dataclasses import dataclass, replace
+from time import process_time
 
 import numpy as np
 
@@ -28,6 +31,7 @@ from semslam.eval.loops.places import PlaceTruth, Revisit, find_places
 from semslam.eval.loops.truth import ANGLE_TOLERANCE, POSE_TOLERANCE
 from semslam.eval.trajectory import poses_at
 from semslam.geometry.se3 import invert, rotation_angle
+from semslam.loop.detector import Remembering
 from semslam.loop.segmentation.classes import NYU40_NAMES
 from semslam.loop.verification.submaps import ends_of
 from semslam.loop.verification.verifier import build_verifier
@@ -73,12 +77,17 @@ def main() -> None:
     parser.add_argument("sequences", nargs="+", help="rendered scenes")
     parser.add_argument("--detectors", default=NAMES)
     parser.add_argument("--every", type=int, default=5, help="frames from one keyframe to the next")
+    parser.add_argument("--crowd", type=int, default=0, help="keyframes in the database before the first query")
     parser.add_argument("--labels", action="store_true", help="exact labels")
     parser.add_argument("--set", action="append", default=[], help="a setting, KEY=VALUE")
     args = parser.parse_args()
     config = Config().with_changes(**parse_overrides(args.set))
     for path in args.sequences:
         scene = read_scene(path, config, args.every, args.labels)
+        if args.crowd:
+            for name in args.detectors.split(","):
+                print(cost_of(name, scene, config, args.crowd), flush=True)
+            continue
         counts = {kind: len(scene.truth.queries(kind)) for kind in Revisit}
         print(f"{path}: {len(scene.views)} keyframes, revisits: " + ", ".join(f"{n} {k}" for k, n in counts.items()))
         kinds = " | ".join(f"{what} {kind}" for what in ("ranked", "closed") for kind in Revisit)
@@ -126,6 +135,30 @@ def ask(name: str, scene: Scene, config: Config) -> Answers:
                 closed[query] = max(closed[query], float(right))
         detector.add(view)
     return Answers(ranked, bar, closed, verified, off, false)
+
+
+def cost_of(name: str, scene: Scene, config: Config, crowd: int) -> str:
+    """A sentence on what a detector keeps of a keyframe, and on the time of a query among many."""
+    kind = plugins.load("semslam.detectors", name)
+    first, detector = kind.from_config(config), kind.from_config(config)
+    assert isinstance(first, Remembering) and isinstance(detector, Remembering), f"{name} cannot be entered repeatedly."
+    for view in scene.views:
+        first.add(view)
+    looks = first.looks()
+    sizes = [sum(np.asarray(array).nbytes for array in look.arrays.values()) for look in looks]
+    copies = [replace(looks[k % len(looks)], id=k - crowd, timestamp=float(k - 2 * crowd)) for k in range(crowd)]
+    detector.recall(copies)
+    spent = []
+    for view in scene.views:
+        start = process_time()
+        detector.query(view)
+        spent.append(1000 * (process_time() - start))
+        detector.add(view)
+    middle, late = np.percentile(spent, [50, 95])
+    return (
+        f"{name}, {crowd} keyframes: {np.mean(sizes):.0f} bytes kept of one, {max(sizes)} at most;"
+        f" query {middle:.1f} ms, 95 % below {late:.1f} ms"
+    )
 
 
 def error_of(loop: LoopConstraint, poses: FloatArray) -> tuple[float, float]:
