@@ -76,7 +76,7 @@ def carry_out(task: Task, place: "RunPlace", stop: "Stop", past: "JournalContent
     try:
         with place.results() as work:
             fill(work, result, task.dataset, task.plots, task.source, task.command, task.profile)
-    except ResultsError as error:
+    except SemslamError as error:  # whichever writer it comes from
         # Hours of tracking must not die with a full disk: show what was found, and keep the journal.
         out.print(metrics_table([result.metrics], task.dataset.name))
         kept = f"go on by semslam run --resume {place.directory}"

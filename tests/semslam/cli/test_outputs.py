@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from semslam.datasets.tum_format import write_trajectory
-from semslam.errors import ResultsError
+from semslam.errors import ResultsError, TrajectoryError
 from semslam.eval.report.plots import RunDrawing, draw_run
 from semslam.eval.style import PictureSettings
 from semslam.files import filled_folder
@@ -95,3 +95,17 @@ def test_a_signal_that_a_library_hides_while_it_is_imported(
     monkeypatch.setattr("semslam.cli.app.app", fail)
     outcome = semslam("doctor")
     assert (outcome.code, outcome.err.strip()) == (code, "semslam: Interrupted.")
+
+
+def test_whatever_writer_fails_the_run_can_be_saved_later(
+    semslam: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object) -> None:
+        raise TrajectoryError("The trajectory odometry.txt cannot be written: No space left on device.")
+
+    words = ("synthetic:room?frames=8&width=320", "--detector", "none", "--no-plots", "--out", tmp_path / "run")
+    with monkeypatch.context() as patched:
+        patched.setattr("semslam.runs.results.fill", full)
+        done = semslam("run", *words)
+    assert (done.code, "could not be saved; go on by semslam run --resume" in done.err) == (2, True)
+    assert semslam("run", "--resume", tmp_path / "run").code == 0
