@@ -50,27 +50,27 @@ class Processes:
 
     def __init__(self, count: int) -> None:
         self._count = count
+        self._executor: Any = None
 
     def submit(self, job: Job) -> "Future[Outcome]":
         """Schedule a run on the next free process."""
         from joblib.externals.loky import get_reusable_executor
 
         threads = max((os.cpu_count() or 1) // self._count, 1)
-        executor = get_reusable_executor(
+        self._executor = get_reusable_executor(
             max_workers=self._count,
             timeout=None,
             initializer=_limit_threads,
             initargs=(threads,),
             env=dict.fromkeys(THREAD_VARIABLES, str(threads)),
         )
-        future: Future[Outcome] = executor.submit(make_run, job)
+        future: Future[Outcome] = self._executor.submit(make_run, job)
         return future
 
     def stop(self) -> None:
         """Terminate the processes, busy or not."""
-        from joblib.externals.loky import get_reusable_executor
-
-        get_reusable_executor(max_workers=self._count).shutdown(wait=True, kill_workers=True)
+        if self._executor is not None:
+            self._executor.shutdown(wait=True, kill_workers=True)
 
 
 @contextmanager
