@@ -61,9 +61,7 @@ def test_a_suite_of_runs_that_track_nothing_has_its_own_code(semslam: Call, tmp_
 
 def test_a_signal_ends_a_suite_at_once_and_keeps_the_run_in_hand(tmp_path: Path) -> None:
     suite = tmp_path / "suite.yaml"
-    suite.write_text(
-        "name: long\nsequences: ['synthetic:room?rate=60']\nodometries: [feature]\ndetectors: [none]\n"
-    )
+    suite.write_text("name: long\nsequences: ['synthetic:room?rate=60']\nodometries: [feature]\ndetectors: [none]\n")
     out, code = tmp_path / "out", "from semslam.cli import main; main()"
     process = subprocess.Popen(
         [sys.executable, "-c", code, "bench", str(suite), "--out", str(out)],
