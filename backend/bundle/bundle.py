@@ -11,7 +11,7 @@ import gtsam
 import numpy as np
 import numpy.typing as npt
 
-from semslam.backend.bundle.observations import ObservationTable, gather, reprojection_errors, thinned
+from semslam.backend.bundle.observations import ObservationTable, reprojection_errors, spread, thinned
 from semslam.backend.graph.checks import checked_pose
 from semslam.backend.graph.factors import (
     ANCHOR_SIGMA,
@@ -72,6 +72,8 @@ def adjust(
 ) -> BundleResult:
     """Adjust keyframes and landmarks together; the first keyframe stays where it is.
 
+    Keyframes whose observations are too many to take part are held by ``edges`` alone.
+
     Args:
         poses: (4, 4) T_world_cam to start from, by key.
         observations: landmarks seen, by key; keys without a pose are passed over.
@@ -85,7 +87,7 @@ def adjust(
         GraphError: a pose is not a finite rigid transform, or the optimiser failed.
     """
     poses = {key: checked_pose(T, f"The pose of keyframe {key}") for key, T in poses.items()}
-    observed = gather(poses, observations, intrinsics, config.min_views)
+    observed = spread(poses, observations, intrinsics, config.min_views, config.max_covisible)
     if not len(observed) or not config.rounds:
         return BundleResult(poses, (), 0)
     observed = thinned(observed, config.max_observations)

@@ -1,10 +1,12 @@
 """Landmark observations of all keyframes as flat arrays."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import gtsam
 import numpy as np
+from scipy.sparse import coo_array
 
 from semslam.geometry.se3 import invert, transform_points
 from semslam.types import FloatArray, IntArray, Intrinsics, Observations, Points3, Transform
@@ -78,6 +80,33 @@ def gather(
     return ObservationTable(keys, rows, pixels, depths, sigmas, points, _local(poses, keys, points[rows]))
 
 
+def spread(
+    poses: Mapping[int, Transform],
+    observations: Mapping[int, Observations],
+    intrinsics: Intrinsics,
+    min_views: int,
+    max_pairs: int,
+) -> ObservationTable:
+    """As ``gather``, from every n-th keyframe alone where too many of them see the same.
+
+    Pairs of keyframes with common landmarks fill the matrix that is solved: in one room they grow with the square of
+    the keyframes, whose views say little new by then.
+
+    Args:
+        poses: as for ``gather``.
+        observations: as for ``gather``.
+        intrinsics: as for ``gather``.
+        min_views: as for ``gather``.
+        max_pairs: of keyframes with common landmarks.
+    """
+    observed = gather(poses, observations, intrinsics, min_views)
+    step = math.ceil(math.sqrt(_covisible_pairs(observed) / max_pairs))
+    if step <= 1:
+        return observed
+    kept = np.unique(observed.keys)[::step].tolist()
+    return gather(poses, {key: observations[key] for key in kept}, intrinsics, min_views)
+
+
 def thinned(observed: ObservationTable, wanted: int) -> ObservationTable:
     """Keep the landmarks that most keyframes see, until each keyframe has about ``wanted`` observations.
 
@@ -129,6 +158,15 @@ _NOTHING = ObservationTable(
     points=np.zeros((0, 3)),
     local=np.zeros((0, 3)),
 )
+
+
+def _covisible_pairs(observed: ObservationTable) -> int:
+    """How many pairs of keyframes see a landmark in common."""
+    keys, rows = np.unique(observed.keys, return_inverse=True)
+    seen = coo_array(
+        (np.ones(len(rows), dtype=np.int32), (rows, observed.landmarks)), (len(keys), len(observed.points))
+    ).tocsr()
+    return int((seen @ seen.T).nnz - len(keys)) // 2
 
 
 def _starting_points(

@@ -9,6 +9,9 @@ class BundleConfig(Section):
     rounds: int = setting(3, "adjustments, each without the outliers of the previous one; 0 = none", ge=0)
     iterations: int = setting(5, "maximum number of Levenberg-Marquardt iterations of a round", gt=0)
     max_observations: int = setting(250, "observations of a keyframe beyond which further ones are left out", gt=0)
+    max_covisible: int = setting(
+        100_000, "pairs of keyframes with common landmarks beyond which only every n-th keyframe observes any", gt=0
+    )
     pixel_sigma: float = setting(1.0, "standard deviation of a keypoint's position", unit="px", gt=0)
     observation_share: float = setting(
         0.0625,

@@ -5,7 +5,7 @@ import pytest
 
 from semslam.backend.analysis.simulation import measure, noisy, ring
 from semslam.backend.bundle.bundle import adjust
-from semslam.backend.bundle.observations import gather, thinned
+from semslam.backend.bundle.observations import gather, spread, thinned
 from semslam.config import BundleConfig
 from semslam.errors import GraphError
 from semslam.geometry.camera import Intrinsics
@@ -111,6 +111,27 @@ def test_keyframes_without_landmarks_keep_to_their_odometry():
     edges = measure(truth, [(k, k + 1) for k in range(15)], rng, 0.1)
     result = adjust(shaken(truth, rng), seen, CAMERA, CONFIG, edges)
     assert error(result.poses, truth) < 0.02
+
+
+def test_where_too_many_see_the_same_every_nth_observes():
+    """All 24 keyframes stay where the room is, though 12 of them observe nothing."""
+    truth, points = world(24)
+    rng = np.random.default_rng(9)
+    seen = look(truth, points, rng, 0.3)
+    start = shaken(truth, rng)
+    edges = measure(truth, [(k, k + 1) for k in range(23)], rng, 0.1)
+    whole = spread(start, seen, CAMERA, 3, max_pairs=10_000)
+    half = spread(start, seen, CAMERA, 3, max_pairs=whole_pairs(whole) // 4)
+    assert np.unique(whole.keys).tolist() == list(range(24))
+    assert np.unique(half.keys).tolist() == list(range(0, 24, 2))
+    config = BundleConfig(max_covisible=whole_pairs(whole) // 4)
+    assert error(adjust(start, seen, CAMERA, config, edges).poses, truth) < 0.02
+
+
+def whole_pairs(observed):
+    views = np.zeros((24, len(observed.points)), dtype=bool)
+    views[observed.keys, observed.landmarks] = True
+    return int(sum((views[k] & views[k + 1 :]).any(1).sum() for k in range(24)))
 
 
 def test_sightings_that_repeat_their_errors_do_not_outweigh_the_edges():
