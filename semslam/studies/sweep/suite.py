@@ -1,11 +1,12 @@
 """A suite: what is run, written in YAML, and the published results that its table shows beside ours."""
 
+import re
 from collections.abc import Mapping
 from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, field_validator, model_validator
 
 from semslam import plugins
 from semslam.config import Config
@@ -64,7 +65,7 @@ class Suite(_Part):
     """A suite: every combination of its lists is run.
 
     Attributes:
-        name: stands above the tables.
+        name: stands above the tables, and is the folder's where none is given.
         sequences: what is run on.
         odometries: registered names.
         detectors: registered names; with "none" among them, differences to it are stated.
@@ -86,6 +87,14 @@ class Suite(_Part):
     max_frames: Annotated[int, Field(ge=1)] | None = None
     config: dict[str, Any] = {}
     marks: tuple[Mark, ...] = ()
+
+    @field_validator("name")
+    @classmethod
+    def _is_a_folder_name(cls, name: str) -> str:
+        """A suite may come from somebody else: its name must not lead out of the folder of suites."""
+        if not re.fullmatch(r"\w[\w .+-]*", name):
+            raise ValueError("a name begins with a letter or digit, and goes on with these, spaces, '.', '+' and '-'")
+        return name
 
     @model_validator(mode="after")
     def _name_each_once(self) -> "Suite":

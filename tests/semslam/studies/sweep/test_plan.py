@@ -68,6 +68,9 @@ def test_a_sequence_is_found_by_its_short_name(tmp_path: Path) -> None:
         ({"odometries": ["wheels"]}, "no odometry 'wheels'"),
         ({"seeds": [-1]}, "seeds.0"),
         ({"nonsense": 1}, "nonsense"),
+        ({"name": "../../elsewhere"}, "name: a name begins with"),
+        ({"name": "/tmp"}, "name: a name begins with"),
+        ({"name": "new\nline"}, "name: a name begins with"),
     ],
 )
 def test_a_mistake_in_a_suite_is_named(values: dict[str, object], complaint: str) -> None:
