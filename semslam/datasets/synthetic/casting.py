@@ -1,7 +1,7 @@
 """Ray casting against a set of triangles, by Open3D."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -26,6 +26,13 @@ class Hits:
     triangles: npt.NDArray[np.int64]
     weights: Float32Array
     normals: Float32Array
+
+
+class Caster(Protocol):
+    """Casts rays, (N, 6) float32 of origin and direction."""
+
+    def cast(self, rays: Float32Array) -> Hits:
+        """First hit of each ray."""
 
 
 class RayCaster:
@@ -55,6 +62,31 @@ class RayCaster:
     def blocked(self, rays: Float32Array, far: float) -> npt.NDArray[np.bool_]:
         """Whether anything lies on each ray nearer than ``far`` lengths of its direction, (N,)."""
         return np.asarray(self._scene.test_occlusions(_tensor(rays), 0.0, far).numpy(), dtype=bool)
+
+
+class TwoCasters:
+    """Two sets of triangles as one, such as what stands and what moves.
+
+    Args:
+        first: the one.
+        second: the other; where both are hit at the same distance, the first counts.
+        offset: added to the second's triangles.
+    """
+
+    def __init__(self, first: Caster, second: Caster, offset: int) -> None:
+        self._first, self._second, self._offset = first, second, offset
+
+    def cast(self, rays: Float32Array) -> Hits:
+        """First hit of each ray."""
+        a, b = self._first.cast(rays), self._second.cast(rays)
+        nearer = b.seen & (~a.seen | (b.distance < a.distance))
+        return Hits(
+            a.seen | b.seen,
+            np.where(nearer, b.distance, a.distance),
+            np.where(nearer, b.triangles + self._offset, a.triangles),
+            np.where(nearer[:, None], b.weights, a.weights),
+            np.where(nearer[:, None], b.normals, a.normals),
+        )
 
 
 def _tensor(array: Any) -> Any:

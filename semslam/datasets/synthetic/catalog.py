@@ -72,6 +72,7 @@ def _recipes() -> dict[str, _Recipe]:
         "enamel": _Recipe(partial(textures.plaster, base=(226, 228, 228), strength=0.5)),
         "dark": _Recipe(partial(textures.plaster, base=(38, 38, 42)), 0.5),
         "metal": _Recipe(partial(textures.wood, base=(150, 152, 156), contrast=0.3), 0.4),
+        "skin": _Recipe(partial(textures.plaster, base=(206, 160, 132), strength=2.0), 0.5),
         "leaves": _Recipe(textures.leaves, 0.5),
         "door": _Recipe(partial(textures.door, base=(222, 214, 198))),
         "carton": _Recipe(partial(pictures.carton, base=(178, 138, 94))),

@@ -18,6 +18,7 @@ from semslam.datasets.synthetic.renderer import Lighting, Renderer, View
 from semslam.datasets.synthetic.scenes import PLANS
 from semslam.datasets.synthetic.sensor import DEPTH_SENSORS, sense_color
 from semslam.datasets.synthetic.shapes import Part
+from semslam.datasets.synthetic.walkers import DISTANCES, Walkers, parts_of, persons
 from semslam.errors import DatasetError
 from semslam.geometry.se3 import Transform, Transforms
 from semslam.types import Frame, Intrinsics, Trajectory
@@ -45,6 +46,7 @@ class Request(Section):
     light: str = Field("same", description="light of the second pass: " + ", ".join(LIGHTS))
     offset: float = Field(0.0, ge=-1, le=1, description="metres that the second pass keeps to the right of the first")
     moved: bool = Field(False, description="objects moved or missing on the second pass")
+    people: int = Field(0, ge=0, le=len(DISTANCES), description="persons who walk to and fro in front of the camera")
     noise: bool = Field(True, description="whether the sensor has noise and holes")
     sensor: str = Field("structured", description="what measures depth: " + ", ".join(DEPTH_SENSORS))
     sway: float = Field(1.0, ge=0, le=20, description="factor on the hand's sway")
@@ -202,13 +204,15 @@ class SyntheticDataset:
         if not 0 <= index < len(self):
             raise IndexError(f"There is no frame {index}: the sequence has {len(self)}.")
         second = bool(self._walk.second[index])
-        renderer = _renderer(self._scene, self._request.seed, bool(second and self._request.moved))
-        lighting = LIGHTS[self._request.light] if second else LIGHTS["same"]
-        request, camera = self._request, self.intrinsics
-        seen = renderer.render(self._poses(index, request.readout, 0.0), camera, lighting)
+        request, camera, time = self._request, self.intrinsics, float(self._walk.timestamps[index])
+        renderer = _renderer(self._scene, request.seed, bool(second and request.moved), request.people)
+        lighting = LIGHTS[request.light] if second else LIGHTS["same"]
+        people = self._walkers.vertices(time) if request.people else None
+        seen = renderer.render(self._poses(index, request.readout, 0.0), camera, lighting, people)
         if not request.delay and request.depth_readout == request.readout:
             return seen
-        depth, cosine = renderer.measure(self._poses(index, request.depth_readout, request.delay), camera)
+        people = self._walkers.vertices(time + request.delay) if request.people else None
+        depth, cosine = renderer.measure(self._poses(index, request.depth_readout, request.delay), camera, people)
         return replace(seen, depth=depth, cosine=cosine)
 
     def _poses(self, index: int, readout: float, delay: float) -> Transform | Transforms:
@@ -239,6 +243,10 @@ class SyntheticDataset:
         return Way(route, request.hand_seed, request.offset, request.sway)
 
     @cached_property
+    def _walkers(self) -> Walkers:
+        return Walkers(persons(self._request.people), self._way, self._way.seconds)
+
+    @cached_property
     def _walk(self) -> Walk:
         whole = self._way.walk(self._request.rate)
         kept = slice(0, self._request.frames or None)
@@ -246,6 +254,6 @@ class SyntheticDataset:
 
 
 @lru_cache(maxsize=4)
-def _renderer(scene: str, seed: int, moved: bool) -> Renderer:
+def _renderer(scene: str, seed: int, moved: bool, people: int) -> Renderer:
     """A scene ready to be rendered; kept, since its light takes seconds to bake."""
-    return Renderer(PLANS[scene].build(seed, moved))
+    return Renderer(PLANS[scene].build(seed, moved, parts_of(persons(people))))

@@ -52,6 +52,11 @@ class Way:
         self._seed, self._offset, self._sway = seed, offset, sway
         self._returned = float(self._knots[len(route.stops) - 1])
 
+    @property
+    def seconds(self) -> float:
+        """How long the whole way takes."""
+        return float(self._knots[-1])
+
     def walk(self, rate: float) -> Walk:
         """The whole way at a steady number of frames a second."""
         times = np.arange(0.0, self._knots[-1], 1.0 / rate)
@@ -59,7 +64,7 @@ class Way:
 
     def poses(self, times: FloatArray) -> FloatArray:
         """Poses T_world_cam (N, 4, 4) at times (N,) in seconds."""
-        tracks = _smooth(self._knots, self._tracks, times)
+        tracks = smooth(self._knots, self._tracks, times)
         tracks += _waves(times, self._seed) * self._sway
         ahead = np.radians(tracks[:, 3])
         shift = self._offset * np.clip((times - self._returned) / 2.0, 0.0, 1.0)
@@ -76,7 +81,7 @@ def _times(stops: Sequence[Stop]) -> FloatArray:
     return np.concatenate([[0.0], np.cumsum(steps)])
 
 
-def _smooth(knots: FloatArray, values: FloatArray, times: FloatArray) -> FloatArray:
+def smooth(knots: FloatArray, values: FloatArray, times: FloatArray) -> FloatArray:
     """Cubic Hermite curve through (K, D) values, at rest at both ends."""
     slopes = np.zeros_like(values)
     slopes[1:-1] = (values[2:] - values[:-2]) / (knots[2:] - knots[:-2])[:, None]

@@ -6,11 +6,11 @@ import numpy as np
 import numpy.typing as npt
 
 from semslam.datasets.synthetic.atlas import TextureAtlas
-from semslam.datasets.synthetic.casting import Hits, RayCaster
+from semslam.datasets.synthetic.casting import Caster, Hits, RayCaster, TwoCasters
 from semslam.datasets.synthetic.lighting import LAMPS, bake
-from semslam.datasets.synthetic.scene import Mesh, Scene, build_mesh
+from semslam.datasets.synthetic.scene import Mesh, Scene, build_mesh, joined
 from semslam.geometry.camera import Intrinsics
-from semslam.geometry.se3 import Float32Array, Transform, Transforms
+from semslam.geometry.se3 import Float32Array, Points3, Transform, Transforms
 
 GAMMA = 2.2
 SHOULDER = 190.0
@@ -61,55 +61,67 @@ class Renderer:
     """
 
     def __init__(self, scene: Scene) -> None:
-        self._mesh = build_mesh(scene)
-        self._caster = RayCaster(self._mesh.vertices, self._mesh.triangles)
+        still = self._mesh = build_mesh(scene.parts, scene.materials)
+        self._caster = RayCaster(still.vertices, still.triangles)
         self._atlas = TextureAtlas(scene.materials)
-        albedo = self._atlas.mean_albedo[self._mesh.materials]
-        self._light = bake(self._mesh, albedo, scene.lights, self._caster)
-        _add_glow(self._light, scene, self._mesh)
+        self._light = bake(still, self._atlas.mean_albedo[still.materials], scene.lights, self._caster)
+        _add_glow(self._light, scene, still)
+        self._moving: Mesh | None = None
+        if scene.moving:
+            self._moving = build_mesh(scene.moving, scene.materials)
+            self._mesh = joined(still, self._moving)
+            self._light = np.concatenate([self._light, _ambient(self._light, self._moving)], axis=1)
         tiles = self._atlas.tiles[self._mesh.materials][:, None]
         self._uvs = (self._mesh.uvs[self._mesh.triangles] / tiles).astype(np.float32)
         self._density = _density(self._mesh, self._uvs, self._atlas.size)
         self._tables: dict[Lighting, Float32Array] = {}
 
-    def render(self, poses: Transform | Transforms, camera: Intrinsics, lighting: Lighting) -> View:
+    def render(
+        self,
+        poses: Transform | Transforms,
+        camera: Intrinsics,
+        lighting: Lighting,
+        moving: Points3 | None = None,
+    ) -> View:
         """One view without any of the sensor's faults.
 
         Args:
             poses: T_world_cam, (4, 4), or (H, 4, 4) where each row is exposed from a pose of its own.
             camera: the camera.
             lighting: how the light is mixed.
+            moving: (V, 3) where the vertices of the scene's moving parts are; None = those are not there.
         """
         shape = camera.height, camera.width
+        caster = self._caster_with(moving)
         directions = _directions(camera).reshape(-1, 3)
-        hits, cosine = self._cast(poses, directions, np.arange(len(directions)) // camera.width)
+        hits, cosine = _cast(caster, poses, directions, np.arange(len(directions)) // camera.width)
         color = self._shade(hits, cosine, directions, camera, lighting)
         edges = np.flatnonzero(self._edges(hits, cosine, shape))
         fine = directions[edges].repeat(len(SUBPIXELS), axis=0)
         fine[:, :2] += np.tile(SUBPIXELS / (camera.fx, camera.fy), (len(edges), 1)).astype(np.float32)
         rows = (edges // camera.width).repeat(len(SUBPIXELS))
-        again = self._shade(*self._cast(poses, fine, rows), fine, camera, lighting)
+        again = self._shade(*_cast(caster, poses, fine, rows), fine, camera, lighting)
         color[edges] = (color[edges] + again.reshape(len(edges), len(SUBPIXELS), 3).sum(1)) / (1 + len(SUBPIXELS))
         labels = np.where(hits.seen, self._mesh.labels[hits.triangles], 0).astype(np.uint8)
         return View(
             color.reshape(*shape, 3), hits.distance.reshape(shape), labels.reshape(shape), cosine.reshape(shape)
         )
 
-    def measure(self, poses: Transform | Transforms, camera: Intrinsics) -> tuple[Float32Array, Float32Array]:
-        """Exact depth and cosine of incidence (H, W) alone, as in ``View``, from poses as for ``render``."""
+    def measure(
+        self, poses: Transform | Transforms, camera: Intrinsics, moving: Points3 | None = None
+    ) -> tuple[Float32Array, Float32Array]:
+        """Exact depth and cosine of incidence (H, W) alone, as in ``View``; arguments as for ``render``."""
         shape = camera.height, camera.width
         directions = _directions(camera).reshape(-1, 3)
-        hits, cosine = self._cast(poses, directions, np.arange(len(directions)) // camera.width)
+        rows = np.arange(len(directions)) // camera.width
+        hits, cosine = _cast(self._caster_with(moving), poses, directions, rows)
         return hits.distance.reshape(shape), cosine.reshape(shape)
 
-    def _cast(
-        self, poses: Transform | Transforms, directions: Float32Array, rows: npt.NDArray[np.int64]
-    ) -> tuple[Hits, Float32Array]:
-        """Hits of directions (N, 3) with z = 1, whose distance is then the depth; and cosines of incidence (N,)."""
-        rays = _rays(poses, directions, rows)
-        hits = self._caster.cast(rays)
-        along = hits.normals[:, 0] * rays[:, 3] + hits.normals[:, 1] * rays[:, 4] + hits.normals[:, 2] * rays[:, 5]
-        return hits, np.abs(along) / _length(directions)
+    def _caster_with(self, moving: Points3 | None) -> Caster:
+        if moving is None or self._moving is None:
+            return self._caster
+        offset = len(self._mesh.triangles) - len(self._moving.triangles)
+        return TwoCasters(self._caster, RayCaster(moving, self._moving.triangles), offset)
 
     def _shade(
         self, hits: Hits, cosine: Float32Array, directions: Float32Array, camera: Intrinsics, lighting: Lighting
@@ -152,6 +164,16 @@ class Renderer:
         return edge
 
 
+def _cast(
+    caster: Caster, poses: Transform | Transforms, directions: Float32Array, rows: npt.NDArray[np.int64]
+) -> tuple[Hits, Float32Array]:
+    """Hits of directions (N, 3) with z = 1, whose distance is then the depth; and cosines of incidence (N,)."""
+    rays = _rays(poses, directions, rows)
+    hits = caster.cast(rays)
+    along = hits.normals[:, 0] * rays[:, 3] + hits.normals[:, 1] * rays[:, 4] + hits.normals[:, 2] * rays[:, 5]
+    return hits, np.abs(along) / _length(directions)
+
+
 def _rays(poses: Transform | Transforms, directions: Float32Array, rows: npt.NDArray[np.int64]) -> Float32Array:
     """Rays (N, 6) of directions (N, 3) in image rows (N,), from one pose or one for each row."""
     rays = np.empty((len(directions), 6), dtype=np.float32)
@@ -182,6 +204,12 @@ def _density(mesh: Mesh, uvs: Float32Array, size: int) -> Float32Array:
     return np.asarray(
         np.log2(size) + 0.5 * np.log2(np.maximum(shown, 1e-12) / np.maximum(area, 1e-12)), dtype=np.float32
     )
+
+
+def _ambient(light: Float32Array, mesh: Mesh) -> Float32Array:
+    """Light (2, V, 3) on what moves: that of the scene in the mean, more from above, without shadows."""
+    upwards = (0.9 + 0.3 * mesh.normals[:, 2] + 0.15 * mesh.normals[:, 0]).astype(np.float32)
+    return np.asarray(light.mean(1, keepdims=True) * upwards[:, None], dtype=np.float32)
 
 
 def _add_glow(light: Float32Array, scene: Scene, mesh: Mesh) -> None:

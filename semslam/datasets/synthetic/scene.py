@@ -1,6 +1,6 @@
 """A scene: triangles with materials and labels, and the lights in it."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,14 +33,16 @@ class Scene:
     """What is rendered.
 
     Attributes:
-        parts: all surfaces.
+        parts: all surfaces that stand.
         materials: by name.
         lights: all lights.
+        moving: surfaces whose vertices are elsewhere in each frame; they throw neither light nor shadow.
     """
 
     parts: Sequence[Part]
     materials: Mapping[str, Material]
     lights: Sequence[Light]
+    moving: Sequence[Part] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,17 +68,30 @@ class Mesh:
     parts: npt.NDArray[np.int64]
 
 
-def build_mesh(scene: Scene) -> Mesh:
-    """Join the parts of a scene."""
-    names = {name: k for k, name in enumerate(scene.materials)}
-    counts = [len(part.triangles) for part in scene.parts]
-    offsets = np.cumsum([0] + [len(part.vertices) for part in scene.parts[:-1]])
+def build_mesh(parts: Sequence[Part], materials: Iterable[str]) -> Mesh:
+    """Join parts; ``materials`` are the names of all materials in their order."""
+    names = {name: k for k, name in enumerate(materials)}
+    counts = [len(part.triangles) for part in parts]
+    offsets = np.cumsum([0] + [len(part.vertices) for part in parts[:-1]])
     return Mesh(
-        vertices=np.concatenate([part.vertices for part in scene.parts]),
-        normals=np.concatenate([part.normals for part in scene.parts]),
-        uvs=np.concatenate([part.uvs for part in scene.parts]),
-        triangles=np.concatenate([p.triangles + o for p, o in zip(scene.parts, offsets, strict=True)]),
-        materials=np.repeat([names[part.material] for part in scene.parts], counts),
-        labels=np.repeat(np.array([part.label for part in scene.parts], dtype=np.uint8), counts),
-        parts=np.repeat(np.arange(len(scene.parts)), counts),
+        vertices=np.concatenate([part.vertices for part in parts]),
+        normals=np.concatenate([part.normals for part in parts]),
+        uvs=np.concatenate([part.uvs for part in parts]),
+        triangles=np.concatenate([p.triangles + o for p, o in zip(parts, offsets, strict=True)]),
+        materials=np.repeat([names[part.material] for part in parts], counts),
+        labels=np.repeat(np.array([part.label for part in parts], dtype=np.uint8), counts),
+        parts=np.repeat(np.arange(len(parts)), counts),
+    )
+
+
+def joined(first: Mesh, second: Mesh) -> Mesh:
+    """Two meshes of the same materials as one."""
+    return Mesh(
+        vertices=np.concatenate([first.vertices, second.vertices]),
+        normals=np.concatenate([first.normals, second.normals]),
+        uvs=np.concatenate([first.uvs, second.uvs]),
+        triangles=np.concatenate([first.triangles, second.triangles + len(first.vertices)]),
+        materials=np.concatenate([first.materials, second.materials]),
+        labels=np.concatenate([first.labels, second.labels]),
+        parts=np.concatenate([first.parts, second.parts + first.parts.max() + 1]),
     )

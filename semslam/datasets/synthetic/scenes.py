@@ -1,6 +1,6 @@
 """The scenes by name: what stands where, and the camera's way through it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,15 +34,16 @@ class Plan:
     back: Route
     rooms: tuple[Corners, ...]
 
-    def build(self, seed: int, moved: bool) -> Scene:
+    def build(self, seed: int, moved: bool, moving: Sequence[Part] = ()) -> Scene:
         """The whole scene, its materials painted.
 
         Args:
             seed: of textures, books and small things.
             moved: whether some things stand elsewhere or are gone.
+            moving: surfaces that are elsewhere in each frame.
         """
         parts, lights = self.furnish(seed, moved)
-        return Scene(parts, make_materials(seed, (part.material for part in parts)), lights)
+        return Scene(parts, make_materials(seed, (part.material for part in (*parts, *moving))), lights, moving)
 
 
 def _house(seed: int, moved: bool) -> Surfaces:
