@@ -63,7 +63,7 @@ class ObjectsDetector(RememberingDetector[Submap]):
         Raises:
             ModelError: weights are missing or damaged.
         """
-        return cls(Backbone.from_config(config), config.section(cls.name, cls.Settings), config.loops)
+        return cls(Backbone.from_config(config, deep=False), config.section(cls.name, cls.Settings), config.loops)
 
     def query(self, view: KeyframeView) -> list[LoopCandidate]:
         """Candidates by the share of objects and walls that agree, with the pose they agree on.
@@ -123,7 +123,7 @@ class ObjectsDetector(RememberingDetector[Submap]):
             last = self._recent[-1]
             step = view.keyframe.T_odom_cam[:3, 3] - last.keyframe.T_odom_cam[:3, 3]
             travelled = last.travelled + float(np.linalg.norm(step))
-        middle = self._backbone.encode(view.color).middle
+        middle = self._backbone.encode_middle(view.color)
         looks: Float32Array = middle.reshape(-1, LOOK_CHANNELS) @ self._directions
         return label_cloud(view, looks, middle.shape[:2], self._config.max_depth, travelled)
 

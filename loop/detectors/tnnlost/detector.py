@@ -42,7 +42,7 @@ class TnnLostDetector(DescriptorDetector):
         Raises:
             ModelError: weights or centres are missing or damaged.
         """
-        backbone, min_score = Backbone.from_config(config), load_min_score(SHIPPED, "codebook")
+        backbone, min_score = Backbone.from_config(config, deep=False), load_min_score(SHIPPED, "codebook")
         return cls(config.loops, backbone, load_codebook(SHIPPED), min_score, config.section(cls.name, cls.Settings))
 
     def describe(self, view: KeyframeView) -> Float32Array:
@@ -51,7 +51,7 @@ class TnnLostDetector(DescriptorDetector):
         Raises:
             ConfigError: the view holds no labels.
         """
-        middle = self._backbone.encode(view.color).middle
+        middle = self._backbone.encode_middle(view.color)
         return describe_features(middle, labels_of(view, self.name), self._codebook, self._config)
 
 

@@ -1,6 +1,7 @@
 """The shipped network through ONNX Runtime: the default segmenter."""
 
 import hashlib
+from collections.abc import Collection
 from pathlib import Path
 from typing import Self
 
@@ -76,8 +77,16 @@ def load_graph(weights: Path | None, precision: str) -> bytes:
         raise ModelError(f"There are no network weights at {path}.") from error
 
 
-def open_session(graph: bytes, size: tuple[int, int], threads: int) -> onnxruntime.InferenceSession:
+def open_session(
+    graph: bytes, size: tuple[int, int], threads: int, needed: Collection[str] = ("logits", "features")
+) -> onnxruntime.InferenceSession:
     """Open a graph for inputs of one size.
+
+    Args:
+        graph: the serialised graph.
+        size: width and height of its input.
+        threads: inference threads.
+        needed: outputs that it has to have.
 
     Raises:
         ModelError: the graph is damaged or of another network.
@@ -94,6 +103,6 @@ def open_session(graph: bytes, size: tuple[int, int], threads: int) -> onnxrunti
     except Exception as error:  # the runtime's errors have no common base of their own
         raise ModelError("The network weights are damaged or not an ONNX graph.") from error
     outputs = {out.name for out in session.get_outputs()}
-    if [i.name for i in session.get_inputs()] != ["image"] or not {"logits", "features"} <= outputs:
+    if [i.name for i in session.get_inputs()] != ["image"] or not set(needed) <= outputs:
         raise ModelError("The ONNX graph is not one that semslam exported.")
     return session

@@ -139,6 +139,7 @@ def test_features_are_a_sixteenth():
     assert first.middle.dtype == np.float32
     assert first.middle.std() > 0
     assert np.array_equal(first.middle, again.middle)
+    assert np.array_equal(first.middle, Backbone.from_config(load_config(), deep=False).encode_middle(some_image()))
 
 
 def test_overlay_has_a_legend_of_what_is_there():
