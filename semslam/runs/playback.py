@@ -15,7 +15,7 @@ from semslam.runs.recording import RecordedFrame
 from semslam.runs.saved_views import Progress, SavedViews, silent
 from semslam.system.result import FrameState
 from semslam.types import Keyframe, LoopOutcome, Transform
-from semslam.viewers.viewer import FinishedRun, KeyframeScene, LoopScene, ShownLoop, Viewer, aligned_truth
+from semslam.viewers.viewer import CameraImage, FinishedRun, KeyframeScene, LoopScene, ShownLoop, Viewer, aligned_truth
 
 
 def play(saved: SavedViews, viewer: Viewer, progress: Progress = silent) -> None:
@@ -45,10 +45,11 @@ def play(saved: SavedViews, viewer: Viewer, progress: Progress = silent) -> None
         if builder.advance(recorded.index, recorded.timestamp, recorded.motion):
             frame = saved.dataset.frame(recorded.index)
             keyframe = builder.build(frame)
-            viewer.track(frame, _state(recorded, builder.pose.T_odom_cam, live, keyframe.id))
-            viewer.keyframe(KeyframeScene(keyframe, frame, recorded.motion.observations))
+            image = CameraImage(frame.color, frame.intrinsics)
+            viewer.track(image, _state(recorded, builder.pose.T_odom_cam, live, keyframe.id))
+            viewer.keyframe(KeyframeScene.of(keyframe, frame, recorded.motion.observations))
             labels = segmenter.segment(frame.color, frame.source_index)
-            viewer.loops(LoopScene(keyframe, labels, loops[keyframe.id]))
+            viewer.loops(LoopScene.of(keyframe, labels, loops[keyframe.id]))
             keyframes.append(keyframe)
         else:
             viewer.track(None, _state(recorded, builder.pose.T_odom_cam, live, None))

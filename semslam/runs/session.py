@@ -30,7 +30,16 @@ from semslam.system.closing import KeyframeAnswer
 from semslam.system.result import FrameState, SlamResult
 from semslam.system.slam import Slam
 from semslam.types import Frame, LoopConstraint, Trajectory
-from semslam.viewers.viewer import FinishedRun, KeyframeScene, LoopScene, NoViewer, ShownLoop, Viewer, aligned_truth
+from semslam.viewers.viewer import (
+    CameraImage,
+    FinishedRun,
+    KeyframeScene,
+    LoopScene,
+    NoViewer,
+    ShownLoop,
+    Viewer,
+    aligned_truth,
+)
 
 Progress = Callable[[int, FrameState | None], None]
 
@@ -119,10 +128,9 @@ class Session:
 
     def _show(self, state: FrameState, frame: Frame | None) -> None:
         """Show the viewer a frame; its images are at hand at keyframes at least."""
-        self._viewer.track(frame, state)
+        self._viewer.track(None if frame is None else CameraImage(frame.color, frame.intrinsics), state)
         if state.keyframe is not None and frame is not None:
-            keyframe = self._slam.keyframes[-1]
-            self._viewer.keyframe(KeyframeScene(keyframe, frame, state.motion.observations))
+            self._viewer.keyframe(KeyframeScene.of(self._slam.keyframes[-1], frame, state.motion.observations))
 
     def _show_answer(self, answer: KeyframeAnswer) -> None:
         """Show the viewer what became of a keyframe, and note it."""
@@ -136,7 +144,7 @@ class Session:
             for v in answer.verifications
             if isinstance(v, LoopConstraint) or not v.reason.is_unverified
         )
-        self._viewer.loops(LoopScene(self._slam.keyframes[answer.keyframe], answer.labels, loops))
+        self._viewer.loops(LoopScene.of(self._slam.keyframes[answer.keyframe], answer.labels, loops))
 
     def close(self) -> None:
         """Stop the reading thread and loop closing."""

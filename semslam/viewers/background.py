@@ -1,64 +1,111 @@
-"""A viewer in a thread of its own, so that a run does not wait for what it shows."""
+"""A viewer beside the run, which does not wait for what it shows."""
 
+from collections import deque
 from collections.abc import Callable
-from queue import Queue
-from threading import Thread
+from concurrent.futures import Future
+from functools import partial
+from operator import methodcaller
+
+import numpy as np
 
 from semslam.errors import as_our_own
+from semslam.runtime.workers import Worker, WorkerKind, answer_of, make_worker
 from semslam.system.result import FrameState
-from semslam.types import Frame
-from semslam.viewers.viewer import FinishedRun, KeyframeScene, LoopScene, Viewer
+from semslam.viewers.viewer import CameraImage, FinishedRun, KeyframeScene, LoopScene, Viewer
 
 WAITING = 64
 """Calls that wait for the viewer at the most; a run that is further ahead waits."""
-_Call = Callable[[Viewer], None]
+IMAGE_INTERVAL = 0.09
+"""Seconds between two images that are passed on: ten a second; compressing them is most of a viewer's work."""
+_Call = Callable[[Viewer], object]
 
 
 class BackgroundViewer:
-    """Passes all that it is shown to another viewer, in order, in one thread.
+    """Passes what it is shown to another viewer, in order; of the images ten a second and those of keyframes.
 
     A viewer that fails is left alone from then on: it costs the run nothing but its pictures.
 
     Args:
-        open_viewer: opens the other viewer, in the thread.
-        report: called from the thread with one sentence if the viewer fails.
+        open_viewer: opens the other viewer, where it works; for a process it can be pickled.
+        report: called with one sentence if the viewer fails.
+        kind: where the other viewer works; a process leaves the interpreter's lock to the run.
     """
 
-    def __init__(self, open_viewer: Callable[[], Viewer], report: Callable[[str], None]) -> None:
-        self._calls: Queue[_Call | None] = Queue(WAITING)
+    def __init__(
+        self, open_viewer: Callable[[], Viewer], report: Callable[[str], None], kind: WorkerKind = WorkerKind.PROCESS
+    ) -> None:
+        self._worker: Worker[_Call, None] = make_worker(kind, partial(_prepare, open_viewer))
         self._report = report
-        self._thread = Thread(target=self._work, args=(open_viewer,), name="viewer", daemon=True)
-        self._thread.start()
+        self._waiting: deque[Future[None]] = deque()
+        self._next_image = -np.inf
+        self._ended = False
 
-    def track(self, frame: Frame | None, state: FrameState) -> None:
+    def track(self, image: CameraImage | None, state: FrameState) -> None:
         """See ``Viewer``."""
-        self._calls.put(lambda viewer: viewer.track(frame, state))
+        if state.keyframe is None and state.timestamp < self._next_image:
+            image = None
+        if image is not None:
+            self._next_image = state.timestamp + IMAGE_INTERVAL
+        self._show(methodcaller("track", image, state))
 
     def keyframe(self, scene: KeyframeScene) -> None:
         """See ``Viewer``."""
-        self._calls.put(lambda viewer: viewer.keyframe(scene))
+        self._show(methodcaller("keyframe", scene))
 
     def loops(self, scene: LoopScene) -> None:
         """See ``Viewer``."""
-        self._calls.put(lambda viewer: viewer.loops(scene))
+        self._show(methodcaller("loops", scene))
 
     def finish(self, finished: Callable[[], FinishedRun]) -> None:
-        """See ``Viewer``."""
-        self._calls.put(lambda viewer: viewer.finish(finished))
+        """See ``Viewer``; nothing is shown after it."""
+        if not self._ended:
+            self._show(methodcaller("finish", partial(_as_it_is, finished())))
+        self._end()
 
     def close(self) -> None:
         """Wait until everything is shown, and close the viewer."""
-        self._calls.put(lambda viewer: viewer.close())
-        self._calls.put(None)
-        self._thread.join()
+        self._end()
+        while self._waiting:
+            self._check(self._waiting.popleft())
+        self._worker.close()
 
-    def _work(self, open_viewer: Callable[[], Viewer]) -> None:
-        calls = iter(self._calls.get, None)
+    def _end(self) -> None:
+        """Show no more after what is still waiting."""
+        if not self._ended:
+            self._show(methodcaller("close"))
+            self._ended = True
+            self._worker.begin_close()
+
+    def _show(self, call: _Call) -> None:
+        if self._ended:
+            return
+        self._waiting.append(self._worker.submit(call))
+        while self._waiting and (self._waiting[0].done() or len(self._waiting) > WAITING):
+            self._check(self._waiting.popleft())
+
+    def _check(self, shown: "Future[None]") -> None:
+        """Leave the viewer alone if it has failed."""
         try:
-            viewer = open_viewer()
-            for call in calls:
-                call(viewer)
+            answer_of(shown)
         except Exception as error:  # whatever a viewer raises, the run goes on
             self._report(f"Nothing more is shown: {as_our_own(error)}")
-            for _ in calls:
-                pass
+            self._waiting.clear()
+            self._ended = True
+
+
+def _prepare(open_viewer: Callable[[], Viewer]) -> Callable[[_Call], None]:
+    viewer = open_viewer()
+    has_failed = False
+
+    def show(call: _Call) -> None:
+        nonlocal has_failed
+        if not has_failed:
+            has_failed = True
+            call(viewer)
+            has_failed = False
+
+    return show
+
+
+def _as_it_is(run: FinishedRun) -> FinishedRun:
+    return run

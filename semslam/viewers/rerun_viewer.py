@@ -1,6 +1,7 @@
 """A run shown in Rerun (https://rerun.io)."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, cast
 
 import cv2
@@ -15,7 +16,6 @@ from semslam.loop.segmentation.classes import PALETTE
 from semslam.maps.semantic.saved import LabelledMap
 from semslam.system.result import FrameState
 from semslam.types import (
-    Frame,
     Intrinsics,
     LabelMap,
     LedgerEntry,
@@ -24,14 +24,12 @@ from semslam.types import (
     Transform,
 )
 from semslam.viewers.rerun_blueprint import CAMERA, FINAL, IMAGE, LIVE, TRACKING
-from semslam.viewers.viewer import FinishedRun, KeyframeScene, LoopScene, ShownLoop
+from semslam.viewers.viewer import CameraImage, FinishedRun, KeyframeScene, LoopScene, ShownLoop
 
 if TYPE_CHECKING:
     from rerun import RecordingStream
 
 JPEG = [cv2.IMWRITE_JPEG_QUALITY, 75]
-IMAGE_INTERVAL = 0.09
-"""Seconds between two colour images that are shown: ten a second; compressing them is most of a viewer's work."""
 PNG_FAST = [cv2.IMWRITE_PNG_COMPRESSION, 1, cv2.IMWRITE_PNG_FILTER, cv2.IMWRITE_PNG_FILTER_NONE]
 MILLIMETRES = 1000.0
 PATIENCE = 10.0
@@ -39,9 +37,11 @@ PATIENCE = 10.0
 FRUSTUM = 0.25
 """Metres from the camera's centre at which its image is drawn."""
 WAITING = 64
-"""Keyframes whose images are kept until their labels come; without a loop detector none come."""
+"""Keyframes that are kept until their labels come; without a loop detector none come."""
 NODES = NodeConfig(min_area=0.005, cluster_radius=0.0)
 """Blocks that are shown as nodes; merging dense ones takes longer than everything else that is shown."""
+NODE_STEP = 4
+"""Blocks are found in every fourth row and column of the labels, in a third of the time."""
 
 
 class RerunViewer:
@@ -57,15 +57,14 @@ class RerunViewer:
     def __init__(self, stream: "RecordingStream") -> None:
         self._stream = stream
         self._last: FrameState | None = None
-        self._next_image = -np.inf
         self._way: list[Points3] = []  # of each frame since it was shown: by odometry alone, with the loops
         self._poses: list[Transform] = []
         self._landmarks: set[int] = set()
-        self._unlabelled: dict[int, Frame] = {}
+        self._unlabelled: dict[int, KeyframeScene] = {}
         self._intrinsics: Intrinsics | None = None
         self._names: tuple[str, ...] | None = None
 
-    def track(self, frame: Frame | None, state: FrameState) -> None:
+    def track(self, image: CameraImage | None, state: FrameState) -> None:
         """See ``Viewer``."""
         import rerun as rr
 
@@ -80,39 +79,37 @@ class RerunViewer:
         if state.keyframe is not None:
             self._show_way()
         self._stream.log(f"{TRACKING}/inliers", rr.Scalars(state.motion.inliers))
-        if frame is not None and (state.keyframe is not None or state.timestamp >= self._next_image):
-            self._next_image = state.timestamp + IMAGE_INTERVAL
-            self._show_camera(frame.intrinsics)
-            jpeg = cv2.imencode(".jpg", cv2.cvtColor(frame.color, cv2.COLOR_RGB2BGR), JPEG)[1].tobytes()
+        if image is not None:
+            self._show_camera(image.intrinsics)
+            jpeg = cv2.imencode(".jpg", cv2.cvtColor(image.color, cv2.COLOR_RGB2BGR), JPEG)[1].tobytes()
             self._stream.log(f"{IMAGE}/color", rr.EncodedImage(contents=jpeg, media_type="image/jpeg"))
 
     def keyframe(self, scene: KeyframeScene) -> None:
         """See ``Viewer``."""
         import rerun as rr
 
-        T = scene.keyframe.T_odom_cam if self._last is None else self._last.T_world_cam
+        T = scene.T_odom_cam if self._last is None else self._last.T_world_cam
         self._poses.append(T)
-        depth = np.rint(scene.frame.depth * MILLIMETRES).clip(0, 65535).astype(np.uint16)
+        depth = np.rint(scene.depth * MILLIMETRES).clip(0, 65535).astype(np.uint16)
         png = cv2.imencode(".png", depth, PNG_FAST)[1].tobytes()
         self._stream.log(f"{IMAGE}/depth", rr.EncodedDepthImage(blob=png, media_type="image/png", meter=MILLIMETRES))
-        cloud = scene.keyframe.cloud
+        cloud = scene.cloud
         self._stream.log(
             f"{LIVE}/cloud",
             rr.Points3D(transform_points(T, cloud.points), colors=cloud.colors, radii=rr.Radius.ui_points(1)),
         )
         if scene.observations is not None:
-            self._show_landmarks(scene.observations, scene.keyframe.intrinsics, T)
-        self._unlabelled[scene.keyframe.id] = scene.frame
+            self._show_landmarks(scene.observations, scene.intrinsics, T)
+        self._unlabelled[scene.id] = scene
         if len(self._unlabelled) > WAITING:
             del self._unlabelled[min(self._unlabelled)]
 
     def loops(self, scene: LoopScene) -> None:
         """See ``Viewer``."""
-        keyframe = scene.keyframe
-        frame = self._unlabelled.pop(keyframe.id, None)
-        self._set_time(keyframe.frame_index, keyframe.timestamp)
-        if scene.labels is not None and frame is not None:
-            self._show_labels(scene.labels, frame, self._poses[keyframe.id])
+        keyframe = self._unlabelled.pop(scene.keyframe, None)
+        self._set_time(scene.frame_index, scene.timestamp)
+        if scene.labels is not None and keyframe is not None:
+            self._show_labels(scene.labels, keyframe, self._poses[scene.keyframe])
         self._show_loops(scene.loops)
         if self._last is not None:
             self._set_time(self._last.index, self._last.timestamp)
@@ -195,17 +192,19 @@ class RerunViewer:
         self._stream.log(f"{LIVE}/landmarks", rr.Points3D(points, colors=(255, 196, 0), radii=rr.Radius.ui_points(2)))
         self._stream.log(f"{TRACKING}/landmarks", rr.Scalars(len(seen.landmarks)))
 
-    def _show_labels(self, labels: LabelMap, frame: Frame, T_world_cam: Transform) -> None:
+    def _show_labels(self, labels: LabelMap, keyframe: KeyframeScene, T_world_cam: Transform) -> None:
         import rerun as rr
 
         self._name_classes(labels.names)
         self._stream.log(f"{IMAGE}/labels", rr.SegmentationImage(labels.labels))
-        nodes = extract_nodes(labels, frame.depth, NODES)
-        self._stream.log(f"{IMAGE}/nodes", rr.Points2D(nodes.uvd[:, :2], class_ids=nodes.labels, radii=4))
+        thinned = np.s_[::NODE_STEP, ::NODE_STEP]
+        nodes = extract_nodes(replace(labels, labels=labels.labels[thinned]), keyframe.depth[thinned], NODES)
+        uv = nodes.uvd[:, :2] * NODE_STEP
+        self._stream.log(f"{IMAGE}/nodes", rr.Points2D(uv, class_ids=nodes.labels, radii=4))
         near = nodes.uvd[:, 2] > 0
         z = nodes.uvd[near, 2:]
-        camera = frame.intrinsics
-        rays = (camera.undistort_pixels(nodes.uvd[near, :2]) - (camera.cx, camera.cy)) / (camera.fx, camera.fy)
+        camera = keyframe.intrinsics
+        rays = (camera.undistort_pixels(uv[near]) - (camera.cx, camera.cy)) / (camera.fx, camera.fy)
         points = transform_points(T_world_cam, np.column_stack([rays * z, z]))
         self._stream.log(
             f"{LIVE}/nodes", rr.Points3D(points, class_ids=nodes.labels[near], radii=0.03, show_labels=False)

@@ -2,13 +2,25 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, Self
 
 from semslam.errors import TrajectoryError
 from semslam.eval.trajectory import align
 from semslam.maps.semantic.saved import LabelledMap
 from semslam.system.result import FrameState
-from semslam.types import Cloud, Frame, Keyframe, LabelMap, LedgerEntry, Observations, Trajectory, Transform
+from semslam.types import (
+    Cloud,
+    Float32Array,
+    Frame,
+    Intrinsics,
+    Keyframe,
+    LabelMap,
+    LedgerEntry,
+    Observations,
+    Trajectory,
+    Transform,
+    UInt8Array,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,18 +33,43 @@ class ShownLoop:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class CameraImage:
+    """What the camera sees.
+
+    Attributes:
+        color: (H, W, 3) uint8, RGB.
+        intrinsics: the camera.
+    """
+
+    color: UInt8Array
+    intrinsics: Intrinsics
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class KeyframeScene:
     """A new keyframe.
 
     Attributes:
-        keyframe: the new one.
-        frame: its images.
+        id: its number.
+        T_odom_cam: (4, 4) its pose by odometry.
+        cloud: its points in the camera's frame.
+        depth: (H, W) metres; 0 = none.
+        intrinsics: the camera.
         observations: landmarks that the odometry saw in it, where it keeps any.
     """
 
-    keyframe: Keyframe
-    frame: Frame
+    id: int
+    T_odom_cam: Transform
+    cloud: Cloud
+    depth: Float32Array
+    intrinsics: Intrinsics
     observations: Observations | None
+
+    @classmethod
+    def of(cls, keyframe: Keyframe, frame: Frame, observations: Observations | None) -> Self:
+        """What is shown of a keyframe and its frame."""
+        cloud = keyframe.cloud
+        return cls(keyframe.id, keyframe.T_odom_cam, cloud, frame.depth, frame.intrinsics, observations)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,14 +77,23 @@ class LoopScene:
     """What loop closing made of a keyframe, known some frames after it.
 
     Attributes:
-        keyframe: that one.
+        keyframe: its number.
+        frame_index: its frame's place in the sequence.
+        timestamp: seconds.
         labels: its segmentation, where one was made.
         loops: its loop candidates.
     """
 
-    keyframe: Keyframe
+    keyframe: int
+    frame_index: int
+    timestamp: float
     labels: LabelMap | None
     loops: Sequence[ShownLoop]
+
+    @classmethod
+    def of(cls, keyframe: Keyframe, labels: LabelMap | None, loops: Sequence[ShownLoop]) -> Self:
+        """What is shown of a keyframe's loops."""
+        return cls(keyframe.id, keyframe.frame_index, keyframe.timestamp, labels, loops)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -74,8 +120,8 @@ class FinishedRun:
 class Viewer(Protocol):
     """Is shown a run as it goes. Nothing that it does may change the run."""
 
-    def track(self, frame: Frame | None, state: FrameState) -> None:
-        """Show a frame that was tracked; its images where they are at hand."""
+    def track(self, image: CameraImage | None, state: FrameState) -> None:
+        """Show a frame that was tracked; its image where it is at hand."""
 
     def keyframe(self, scene: KeyframeScene) -> None:
         """Show a new keyframe, after its frame."""
@@ -93,7 +139,7 @@ class Viewer(Protocol):
 class NoViewer:
     """Shows nothing."""
 
-    def track(self, frame: Frame | None, state: FrameState) -> None:
+    def track(self, image: CameraImage | None, state: FrameState) -> None:
         """Do nothing."""
 
     def keyframe(self, scene: KeyframeScene) -> None:

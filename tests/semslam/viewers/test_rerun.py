@@ -12,6 +12,7 @@ from semslam.config import Config
 from semslam.datasets import open_dataset
 from semslam.runs.pipeline import replay, run
 from semslam.runs.results import write_run
+from semslam.runtime.workers import WorkerKind
 from semslam.viewers import rerun_viewer
 from semslam.viewers.background import BackgroundViewer
 from semslam.viewers.rerun_stream import open_viewer
@@ -131,7 +132,7 @@ def test_a_window_is_started_and_may_be_closed(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr(rerun_bindings, "spawn", lambda **options: started.append(options))
     monkeypatch.setattr(rerun_viewer, "PATIENCE", 0.2)
     problems: list[str] = []
-    viewer = BackgroundViewer(lambda: open_viewer("room", None, live=True), problems.append)
+    viewer = BackgroundViewer(lambda: open_viewer("room", None, live=True), problems.append, WorkerKind.THREAD)
     viewer.close()
     assert len(started) == 1
     assert Path(str(started[0]["executable_path"])).is_file()
