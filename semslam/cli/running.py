@@ -64,6 +64,9 @@ class Done:
 
 def carry_out(task: Task, place: "RunPlace", stop: "Stop", past: "JournalContent | None" = None) -> Done:
     """Run, write, and only then talk: nobody may be listening any more."""
+    from semslam.runs.closing_place import start_closing_ahead
+
+    start_closing_ahead(task.config, len(task.dataset), task.feed is not None)
     from semslam.runs.pipeline import PartialRunError
     from semslam.runs.results import fill
     from semslam.runs.shortfall import shortfall

@@ -1,6 +1,5 @@
 """A run between its first frame and its result."""
 
-import multiprocessing
 from collections.abc import Callable, Iterable, Iterator
 from functools import lru_cache, partial
 
@@ -14,6 +13,7 @@ from semslam.eval.trajectory import score_remark
 from semslam.loop.verification.verifier import LoopVerifier
 from semslam.maps.cloud import join_clouds
 from semslam.runs.clock import RunClock
+from semslam.runs.closing_place import closing_place
 from semslam.runs.journal import Journal, JournalError
 from semslam.runs.latency import Latencies
 from semslam.runs.metrics import SensorMetrics
@@ -25,7 +25,6 @@ from semslam.runs.sensor import CalibratedSequence, needs_timing
 from semslam.runtime.garbage import loaded_objects_left_alone
 from semslam.runtime.stopping import Stop
 from semslam.runtime.stopwatch import Stopwatch
-from semslam.runtime.workers import WorkerKind
 from semslam.system.closing import KeyframeAnswer
 from semslam.system.result import FrameState, SlamResult
 from semslam.system.slam import Slam
@@ -42,9 +41,6 @@ from semslam.viewers.viewer import (
 )
 
 Progress = Callable[[int, FrameState | None], None]
-
-LONG_SEQUENCE = 300
-"""Frames from which on a process of its own for loops is worth its start."""
 
 
 class Session:
@@ -63,7 +59,7 @@ class Session:
         self._viewer = viewer or NoViewer()
         self._stopwatch, self._clock, self._latencies = Stopwatch(), RunClock(), Latencies()
         realtime = feed is not None
-        worker = _worker(config, len(dataset), realtime)
+        worker = closing_place(config, len(dataset), realtime)
         try:
             self._slam = Slam.from_config(config, self._stopwatch, verifier, worker, self._show_answer, realtime)
         except FOREIGN as error:  # what a part from outside raises when it is built
@@ -247,19 +243,6 @@ class Session:
         metrics, truth = scores.metrics, self._dataset.ground_truth
         remark = score_remark(scores.trajectory, truth, metrics.optimized, metrics.frames)
         return [*(doubt.sentence for doubt in found), *([] if remark is None else [remark])]
-
-
-def _worker(config: Config, frames: int, realtime: bool) -> WorkerKind:
-    """Where loops are closed; a process takes seconds to start, which a short sequence does not win back.
-
-    In real time it has started before the first frame.
-
-    Where runs are made side by side, in processes of their own, each stays in its process.
-    """
-    if config.loops.worker == "auto":
-        is_worth_it = (realtime or frames >= LONG_SEQUENCE) and multiprocessing.parent_process() is None
-        return WorkerKind.PROCESS if is_worth_it else WorkerKind.NONE
-    return WorkerKind(config.loops.worker)
 
 
 def _shown_at_the_end(slam: SlamResult, scores: Scores, ground_truth: Trajectory | None) -> FinishedRun:

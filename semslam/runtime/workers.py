@@ -8,6 +8,8 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from enum import StrEnum
+from functools import partial
+from importlib import import_module
 from threading import Thread
 from typing import Any, Generic, TypeVar
 
@@ -97,9 +99,9 @@ class ProcessWorker(Worker[Job, Answer]):
 
     def __init__(self, make: Make[Job, Answer]) -> None:
         from cloudpickle import dumps
-        from joblib.externals.loky.backend import get_context
 
-        self._pool = ProcessPoolExecutor(max_workers=1, mp_context=get_context("loky"), initializer=_obey_the_parent)
+        started = _started_ahead.pop(_module_of(make), None)
+        self._pool = started or _new_pool()
         self._prepared = self._pool.submit(_prepare, dumps(make))
         self._ending: Thread | None = None
 
@@ -123,6 +125,19 @@ class ProcessWorker(Worker[Job, Answer]):
     def wait_until_ready(self) -> None:
         """See ``Worker``."""
         answer_of(self._prepared)
+
+
+def start_ahead(module: str) -> None:
+    """Start a process while the caller still loads what it needs itself.
+
+    The next ``ProcessWorker`` whose function is made by something in the module works in that process.
+
+    Args:
+        module: a module's full name, which the process imports meanwhile.
+    """
+    pool = _new_pool()
+    pool.submit(import_module, module)
+    _started_ahead[module] = pool
 
 
 def answer_of(future: "Future[Answer]") -> Answer:
@@ -160,6 +175,20 @@ def make_worker(kind: WorkerKind, make: Make[Job, Answer]) -> Worker[Job, Answer
     if kind is WorkerKind.PROCESS:
         return ProcessWorker(make)
     return ThreadWorker(make) if kind is WorkerKind.THREAD else InlineWorker(make)
+
+
+_started_ahead: dict[str, ProcessPoolExecutor] = {}
+
+
+def _new_pool() -> ProcessPoolExecutor:
+    from joblib.externals.loky.backend import get_context
+
+    return ProcessPoolExecutor(max_workers=1, mp_context=get_context("loky"), initializer=_obey_the_parent)
+
+
+def _module_of(make: Callable[..., object]) -> str:
+    made_by = make.func if isinstance(make, partial) else make
+    return made_by.__module__
 
 
 _prepared: list[Callable[[Any], Any] | BaseException] = []

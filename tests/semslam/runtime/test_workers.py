@@ -6,12 +6,15 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from functools import partial
+from operator import itemgetter
 from pathlib import Path
 
 import pytest
 
 from semslam.errors import DatasetError, ModelError, SemslamError
-from semslam.runtime.workers import WorkerKind, answer_of, make_worker
+from semslam.runtime import workers
+from semslam.runtime.workers import WorkerKind, answer_of, make_worker, start_ahead
 
 SCRIPT = """
 import os, signal, sys
@@ -50,6 +53,18 @@ def test_jobs_are_done_in_order_and_errors_come_back(kind: WorkerKind) -> None:
     assert [answers[i].result()[0] for i in (0, 1, 3)] == [1, 3, 6]
     assert (answers[0].result()[1] == os.getpid()) == (kind is not WorkerKind.PROCESS)
     worker.close()
+
+
+def test_a_process_that_was_started_ahead_does_the_work_of_its_module_alone() -> None:
+    start_ahead(__name__)
+    started = workers._started_ahead[__name__].submit(os.getpid).result()
+    other = make_worker(WorkerKind.PROCESS, partial(itemgetter, 0))
+    worker, next_one = make_worker(WorkerKind.PROCESS, summing), make_worker(WorkerKind.PROCESS, summing)
+    assert other.submit([5]).result() == 5
+    assert worker.submit(1).result() == (1, started)
+    assert next_one.submit(1).result()[1] != started
+    for one in (other, worker, next_one):
+        one.close()
 
 
 def broken() -> Callable[[int], int]:
