@@ -75,12 +75,12 @@ class ObjectsDetector(RememberingDetector[Submap]):
             return []
         submap = self._look(view)
         least = self._timeline.min_score
-        matches = {
-            at: match_submaps(submap, self._looks[at], self._config, least) for at in self._shortlist(view, submap)
-        }
+        shortlist = self._shortlist(view, submap)
+        found = match_submaps(submap, [self._looks[at] for at in shortlist], self._config, least)
+        matches = dict(zip(shortlist, found, strict=True))
         scores = np.zeros(len(self._timeline))
-        for at, found in matches.items():
-            scores[at] = 0.0 if found is None else found.score
+        for at, match in matches.items():
+            scores[at] = 0.0 if match is None else match.score
         candidates = []
         for at in self._timeline.best(view.keyframe, scores):
             match = matches[at]

@@ -1,18 +1,15 @@
-"""Votes of pairs of objects and walls for the turn and the shift that lay one submap onto another."""
+"""Votes of pairs of objects and walls for the turn and the shift that lay a submap onto others."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
+from semslam.loop.detectors.objects.pairs import ObjectPairs, WallPairs
 from semslam.loop.detectors.objects.settings import ObjectsConfig
 from semslam.loop.detectors.objects.submap import Int8Array, Submap
-from semslam.loop.detectors.objects.walls import BINS
 from semslam.types import Float32Array, FloatArray, IntArray
 
-TURNS = 4
-"""Maximum number of turns that are tried."""
-TURN_SHARE = 0.6
-"""How good a turn must be, relative to the best, by the directions of surfaces."""
 SPACING = 0.1
 """Metres between the horizontal shifts that are tried."""
 MIN_ALIKE = 0.1
@@ -23,182 +20,155 @@ HEIGHT_TOLERANCE = 0.3
 """Standard deviation, in metres, of matched objects' difference in height."""
 SAME_DIRECTION = np.radians(12.0)
 """How far the normals of matched walls may differ."""
-WALL_WEIGHT = 0.6
+WALL_WEIGHT = np.float32(0.6)
 """Weight of a wall of one square metre against an object of as many voxels."""
 LOOK_SHARE = 0.5
 """How much of an object's similarity is its look, where that counts."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class ObjectPairs:
-    """Objects of two submaps with alike classes and heights, by the query's.
-
-    Attributes:
-        query, match: (P,) objects.
-        weights: (P,) float32, how alike they are times the weight of the query's object.
-    """
-
-    query: IntArray
-    match: IntArray
-    weights: Float32Array
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class WallPairs:
-    """Walls of two submaps that face the same way after a turn, by the query's.
-
-    Attributes:
-        query, match: (P,) walls.
-        normals: (P, 2) float32 of the match's.
-        gaps: (P,) float32 metres, shift along the normal that lays one onto the other.
-        ours, theirs: (2, P) float32 metres along the wall where each begins and ends.
-        weights: (P,) float32 of the query's wall.
-    """
-
-    query: IntArray
-    match: IntArray
-    normals: Float32Array
-    gaps: Float32Array
-    ours: Float32Array
-    theirs: Float32Array
-    weights: Float32Array
-
-    def covered(self, shifts: Float32Array) -> Float32Array:
-        """Root of the share (S, P) of the shorter wall's length that both cover after each shift (S, 2)."""
-        along = shifts[:, 1:] * self.normals[:, 0] - shifts[:, :1] * self.normals[:, 1]
-        both = np.minimum(along + self.ours[1], self.theirs[1]) - np.maximum(along + self.ours[0], self.theirs[0])
-        shorter = np.minimum(self.ours[1] - self.ours[0], self.theirs[1] - self.theirs[0])
-        return np.asarray(np.sqrt(np.clip(both / np.maximum(shorter, np.float32(0.3)), 0, 1)))
-
-
 class Ballot:
-    """What may be matched of two submaps, and what a pose gathers of it.
+    """What may be matched of a query and of several matches.
 
     Attributes:
-        total: sum of weights of the submap that has the smaller sum.
-        rise: metres between the two level frames, by their floors; 0 where either saw none.
-        objects: pairs of objects.
+        totals: (M,) sum of weights of the query or of the match, the smaller one.
+        rises: (M,) metres between the two level frames, by their floors; 0 where either saw none.
     """
 
-    def __init__(self, query: Submap, match: Submap, config: ObjectsConfig) -> None:
-        self._query, self._match, self._config = query, match, config
-        weights = [np.sqrt(np.minimum(submap.objects.sizes, 100) / 100) for submap in (query, match)]
-        walls = [
-            np.float32(WALL_WEIGHT * config.use_structure) * np.sqrt(np.minimum(submap.walls.areas, 4.0))
-            for submap in (query, match)
-        ]
-        self._walls = walls[0]
-        self.total = min(float(weights[side].sum() + walls[side].sum()) for side in (0, 1))
-        rise = match.floor - query.floor
-        self.rise = 0.0 if np.isnan(rise) else float(rise)
-        alike = _likeness(query, match, self.rise, config)
-        i, j = np.nonzero(alike > MIN_ALIKE)
-        self.objects = ObjectPairs(i, j, (alike[i, j] * weights[0][i]).astype(np.float32))
+    def __init__(self, query: Submap, matches: Sequence[Submap], config: ObjectsConfig) -> None:
+        self._config = config
+        sums = [_object_weights(s).sum() + _wall_weights(s, config).sum() for s in (query, *matches)]
+        self.totals: FloatArray = np.minimum(sums[0], np.array(sums[1:], dtype=np.float64))
+        self.rises: FloatArray = np.nan_to_num(np.array([match.floor for match in matches]) - query.floor)
+        self._objects = _pair_objects(query, matches, self.rises, config)
+        self._walls = _pair_walls(query, matches, config)
+        numbers = np.arange(len(matches) + 1)
+        self._object_begins = np.searchsorted(self._objects.job, numbers)
+        self._wall_begins = np.searchsorted(self._walls.job, numbers)
 
-    def turned(self, turn: float) -> "TurnedPairs":
-        """The pairs after the query's level frame was turned by so many radians."""
-        ours, theirs, objects = self._query, self._match, self.objects
-        R = rotation(turn).astype(np.float32)
-        wanted = theirs.objects.centroids[objects.match, :2] - (ours.objects.centroids[:, :2] @ R.T)[objects.query]
-        difference = ours.walls.azimuths[:, None] + np.float32(turn) - theirs.walls.azimuths
-        k, m = np.nonzero((np.cos(difference) > np.cos(SAME_DIRECTION)) & self._config.use_structure)
-        angles = theirs.walls.azimuths[m]
-        walls = WallPairs(
-            k,
-            m,
-            np.stack([np.cos(angles), np.sin(angles)], axis=1),
-            theirs.walls.offsets[m] - ours.walls.offsets[k],
-            np.stack([ours.walls.starts[k], ours.walls.ends[k]]),
-            np.stack([theirs.walls.starts[m], theirs.walls.ends[m]]),
-            self._walls[k],
-        )
-        return TurnedPairs(objects, wanted, walls, self._config)
+    def turned(self, of: IntArray, turns: FloatArray) -> "TurnedPairs":
+        """The pairs of matches (J,), each after the query's level frame was turned by so many radians (J,)."""
+        rows, job = _slices(self._object_begins, of)
+        objects = self._objects.at(rows)
+        cosine, sine = np.cos(turns).astype(np.float32)[job], np.sin(turns).astype(np.float32)[job]
+        x, y = objects.laid.T
+        laid = np.stack([cosine * x - sine * y, sine * x + cosine * y], axis=1)
+        objects = replace(objects, job=job, laid=laid, wanted=objects.wanted + objects.laid - laid)
+        rows, job = _slices(self._wall_begins, of)
+        bends = np.angle(np.exp(1j * (self._walls.bends[rows] - turns[job])))
+        facing = np.flatnonzero(np.abs(bends) < SAME_DIRECTION)
+        walls = replace(self._walls.at(rows[facing]), job=job[facing], bends=bends[facing].astype(np.float32))
+        return TurnedPairs(objects, walls, len(of), self._config)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
 class TurnedPairs:
-    """Pairs of objects and walls after a turn.
+    """Pairs of objects and walls after turns, of one match and turn after the other.
 
     Attributes:
-        objects: pairs of objects.
-        wanted: (P, 2) float32 horizontal shift that lays each of them onto one another.
-        walls: pairs of walls that face the same way.
-        config: tolerances.
+        objects: all pairs of objects.
+        walls: all pairs of walls that face the same way.
     """
 
-    objects: ObjectPairs
-    wanted: Float32Array
-    walls: WallPairs
-    config: ObjectsConfig
+    def __init__(self, objects: ObjectPairs, walls: WallPairs, jobs: int, config: ObjectsConfig) -> None:
+        self.objects, self.walls, self._config = objects, walls, config
+        self._object_begins = np.searchsorted(objects.job, np.arange(jobs + 1)).tolist()
+        self._wall_begins = np.searchsorted(walls.job, np.arange(jobs + 1)).tolist()
 
-    def shifts(self) -> Float32Array:
-        """Shifts (S, 2) that a pair of objects asks for, or two pairs of walls that are not parallel."""
-        normals, gaps, radius = self.walls.normals, self.walls.gaps, self.config.radius
-        sine = normals[:, :1] * normals[:, 1] - normals[:, 1:] * normals[:, 0]
-        first, second = np.nonzero(np.triu(np.abs(sine) > MIN_SINE, 1))
-        a, b, sine = normals[first], normals[second], sine[first, second]
-        x = (gaps[first] * b[:, 1] - gaps[second] * a[:, 1]) / sine
-        y = (gaps[second] * a[:, 0] - gaps[first] * b[:, 0]) / sine
-        shifts = np.concatenate([self.wanted, np.stack([x, y], axis=1)])
-        shifts = shifts[np.hypot(shifts[:, 0], shifts[:, 1]) <= radius]
-        cells = np.rint((shifts + radius) / SPACING).astype(np.int64)
-        _, kept = np.unique(cells[:, 0] * 10_000 + cells[:, 1], return_index=True)
-        return np.asarray(shifts[kept])
+    def of(self, job: int) -> tuple[ObjectPairs, WallPairs]:
+        """The pairs of one match and turn."""
+        objects, walls = self._object_begins, self._wall_begins
+        return (
+            self.objects.at(slice(objects[job], objects[job + 1])),
+            self.walls.at(slice(walls[job], walls[job + 1])),
+        )
 
-    def votes(self, shifts: Float32Array) -> tuple[Float32Array, Float32Array]:
-        """What each pair of objects (S, P) and of walls (S, W) adds to each shift (S, 2)."""
-        off = (shifts[:, :1] - self.wanted[:, 0]) ** 2 + (shifts[:, 1:] - self.wanted[:, 1]) ** 2
-        objects = np.exp(off * np.float32(-0.5 / self.config.tolerance**2)) * self.objects.weights
-        off = (shifts @ self.walls.normals.T - self.walls.gaps) ** 2
-        agreeing = np.exp(off * np.float32(-0.5 / self.config.wall_tolerance**2)) * self.walls.weights
-        return objects, agreeing * self.walls.covered(shifts)
-
-    def scores(self, shifts: Float32Array) -> Float32Array:
-        """Votes (S,) of each shift (S, 2), each object and wall of the query with its best partner."""
-        objects, walls = self.votes(shifts)
-        return _best_partners(objects, self.objects.query) + _best_partners(walls, self.walls.query)
+    def votes(self, shifts: FloatArray) -> tuple[Float32Array, Float32Array]:
+        """What each pair of objects (P,) and of walls (W,) adds to the shift (J, 2) of its match and turn."""
+        x, y = shifts.T.astype(np.float32)
+        config, ours, theirs = self._config, self.objects.job, self.walls.job
+        return (
+            self.objects.votes(x[ours], y[ours], config.tolerance),
+            self.walls.votes(x[theirs], y[theirs], config.wall_tolerance),
+        )
 
 
-def find_turns(query: Submap, match: Submap, config: ObjectsConfig) -> list[float]:
-    """Radians by which the query's level frame may be turned in the match's, the likeliest first.
-
-    They are the peaks of the circular correlation of both submaps' directions of surfaces, class by class.
-    """
-    q, m = query.azimuths.astype(np.float64), match.azimuths.astype(np.float64)
-    if not config.use_labels:
-        q, m = np.sqrt((q**2).sum(0, keepdims=True)), np.sqrt((m**2).sum(0, keepdims=True))
-    spectra = np.conj(np.fft.rfft(q, axis=1)) * np.fft.rfft(m, axis=1)
-    scores = np.fft.irfft(spectra.sum(axis=0), BINS)
-    peaks = np.flatnonzero((scores >= np.roll(scores, 1)) & (scores > np.roll(scores, -1)))
-    if not len(peaks):
-        return []
-    peaks = peaks[np.argsort(-scores[peaks], kind="stable")][:TURNS]
-    found = []
-    for peak in peaks[scores[peaks] >= TURN_SHARE * scores[peaks[0]]]:
-        left, centre, right = scores[peak - 1], scores[peak], scores[(peak + 1) % BINS]
-        part = 0.5 * (left - right) / min(left - 2 * centre + right, -1e-12)
-        found.append(float((peak + part) * 2 * np.pi / BINS))
-    return found
+def list_shifts(objects: ObjectPairs, walls: WallPairs, radius: float) -> Float32Array:
+    """Shifts (S, 2) that a pair of objects asks for, or two pairs of walls that are not parallel."""
+    normals, gaps = walls.normals, walls.gaps
+    sine = normals[:, :1] * normals[:, 1] - normals[:, 1:] * normals[:, 0]
+    first, second = np.nonzero(np.triu(np.abs(sine) > MIN_SINE, 1))
+    a, b, sine = normals[first], normals[second], sine[first, second]
+    x = (gaps[first] * b[:, 1] - gaps[second] * a[:, 1]) / sine
+    y = (gaps[second] * a[:, 0] - gaps[first] * b[:, 0]) / sine
+    shifts = np.concatenate([objects.wanted, np.stack([x, y], axis=1)])
+    shifts = shifts[np.hypot(shifts[:, 0], shifts[:, 1]) <= radius]
+    cells = np.rint((shifts + radius) / SPACING).astype(np.int64)
+    _, kept = np.unique(cells[:, 0] * 10_000 + cells[:, 1], return_index=True)
+    return np.asarray(shifts[kept])
 
 
-def rotation(turn: float) -> FloatArray:
-    """Matrix (2, 2) of a turn."""
-    return np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+def score_shifts(objects: ObjectPairs, walls: WallPairs, shifts: Float32Array, config: ObjectsConfig) -> Float32Array:
+    """Votes (S,) of each shift (S, 2), each object and wall of the query with its best partner."""
+    x, y = shifts[:, :1], shifts[:, 1:]
+    return _best_partners(objects.votes(x, y, config.tolerance), objects.query) + _best_partners(
+        walls.votes(x, y, config.wall_tolerance), walls.query
+    )
 
 
-def _likeness(query: Submap, match: Submap, rise: float, config: ObjectsConfig) -> FloatArray:
-    """How alike (Q, M) objects are in class, look, size and height, 0..1."""
-    q, m = query.objects, match.objects
-    alike = np.ones((len(q), len(m)))
+def _pair_objects(query: Submap, matches: Sequence[Submap], rises: FloatArray, config: ObjectsConfig) -> ObjectPairs:
+    """Pairs before any turn, match by match."""
+    ours, theirs = query.objects, [match.objects for match in matches]
+    counts = [len(things) for things in theirs]
+    job, j = np.repeat(np.arange(len(matches)), counts), np.concatenate([np.arange(count) for count in counts])
+    sizes, centroids = np.concatenate([t.sizes for t in theirs]), np.concatenate([t.centroids for t in theirs])
+    kin = np.ones((len(ours), len(sizes)))
     if config.use_labels:
-        alike = _cosines(q.classes, m.classes)
-        alike *= alike > 0.5
+        kin = _cosines(ours.classes, np.concatenate([things.classes for things in theirs]))
+        kin *= kin > 0.5
+    column, i = np.nonzero(kin.T > MIN_ALIKE)
+    alike = kin[i, column]
     if config.use_look:
-        cosine = np.clip(_cosines(q.looks, m.looks), 0, 1)
+        cosine = np.clip(_cosines(ours.looks, np.concatenate([things.looks for things in theirs])), 0, 1)[i, column]
         alike = alike * (1 - LOOK_SHARE + LOOK_SHARE * cosine)
-    small = np.minimum(q.sizes[:, None], m.sizes[None]) / np.maximum(q.sizes[:, None], m.sizes[None])
-    off = q.centroids[:, None, 2] + rise - m.centroids[None, :, 2]
-    return np.asarray(alike * small**0.25 * np.exp(-0.5 * (off / HEIGHT_TOLERANCE) ** 2))
+    small = np.minimum(ours.sizes[i], sizes[column]) / np.maximum(ours.sizes[i], sizes[column])
+    off = ours.centroids[i, 2] + rises[job[column]] - centroids[column, 2]
+    alike = alike * small**0.25 * np.exp(-0.5 * (off / HEIGHT_TOLERANCE) ** 2)
+    kept = np.flatnonzero(alike > MIN_ALIKE)
+    kept = kept[np.lexsort((j[column[kept]], i[kept], job[column[kept]]))]
+    i, column, alike = i[kept], column[kept], alike[kept]
+    here = ours.centroids[i, :2]
+    weights = (alike * _object_weights(query)[i]).astype(np.float32)
+    return ObjectPairs(job[column], i, j[column], here, centroids[column, :2] - here, weights)
+
+
+def _pair_walls(query: Submap, matches: Sequence[Submap], config: ObjectsConfig) -> WallPairs:
+    """All pairs before any turn, match by match."""
+    ours, theirs = query.walls, [match.walls for match in matches]
+    counts = [len(ours) * len(walls) * config.use_structure for walls in theirs]
+    job = np.repeat(np.arange(len(matches)), counts)
+    within = np.arange(len(job)) - np.repeat(np.cumsum(counts) - counts, counts)
+    lengths = np.array([len(walls) for walls in theirs], dtype=np.int64)
+    k, m = within // np.maximum(lengths[job], 1), within % np.maximum(lengths[job], 1)
+    column = (np.cumsum(lengths) - lengths)[job] + m
+    azimuths = np.concatenate([walls.azimuths for walls in theirs])[column]
+    return WallPairs(
+        job,
+        k,
+        m,
+        np.stack([np.cos(azimuths), np.sin(azimuths)], axis=1),
+        np.concatenate([walls.offsets for walls in theirs])[column] - ours.offsets[k],
+        azimuths - ours.azimuths[k],
+        np.stack([ours.starts, ours.ends], axis=1)[k],
+        np.concatenate([np.stack([walls.starts, walls.ends], axis=1) for walls in theirs])[column],
+        _wall_weights(query, config)[k],
+    )
+
+
+def _object_weights(submap: Submap) -> Float32Array:
+    return np.sqrt(np.minimum(submap.objects.sizes, 100) / 100)
+
+
+def _wall_weights(submap: Submap, config: ObjectsConfig) -> Float32Array:
+    return WALL_WEIGHT * np.float32(config.use_structure) * np.sqrt(np.minimum(submap.walls.areas, 4.0))
 
 
 def _cosines(a: Int8Array, b: Int8Array) -> FloatArray:
@@ -206,9 +176,16 @@ def _cosines(a: Int8Array, b: Int8Array) -> FloatArray:
     return np.asarray(a.astype(np.float64) @ b.astype(np.float64).T / 127.0**2)
 
 
+def _slices(begins: IntArray, of: IntArray) -> tuple[IntArray, IntArray]:
+    """Rows of the slices (J,) of something that begins at begins[k] and ends at begins[k + 1], and of which each is."""
+    counts = begins[of + 1] - begins[of]
+    job = np.repeat(np.arange(len(of)), counts)
+    return np.arange(len(job)) + (begins[of] - np.cumsum(counts) + counts)[job], job
+
+
 def _best_partners(votes: Float32Array, owners: IntArray) -> Float32Array:
     """Sum (S,) over owners, which ascend, of the best vote (S, P) of each."""
     if not len(owners):
         return np.zeros(len(votes), dtype=np.float32)
-    begins = np.flatnonzero(np.diff(owners, prepend=-1))
+    begins = np.concatenate([[0], 1 + np.flatnonzero(owners[1:] != owners[:-1])])
     return np.asarray(np.maximum.reduceat(votes, begins, axis=1).sum(axis=1))

@@ -79,7 +79,7 @@ def test_a_room_has_floor_walls_and_things(views: list[KeyframeView]) -> None:
 
 def test_halves_of_one_room_find_their_pose(views: list[KeyframeView]) -> None:
     ours, theirs = submap_of(views[5:]), submap_of(views[:9])
-    found = match_submaps(ours, theirs, CONFIG)
+    (found,) = match_submaps(ours, [theirs], CONFIG)
     assert found is not None
     T = theirs.T_cam_level @ found.T_match_query @ invert(ours.T_cam_level)
     true = invert(views[8].keyframe.T_odom_cam) @ views[-1].keyframe.T_odom_cam
@@ -123,7 +123,7 @@ def furnished(T: FloatArray, seed: int, objects: int = 12) -> Submap:
 )
 def test_any_turn_and_shift_is_found(turn: float, shift: tuple[float, float, float], seed: int) -> None:
     T = make_transform(exp_so3([0, 0, turn]), shift)
-    found = match_submaps(furnished(np.eye(4), seed), furnished(T, seed), CONFIG)
+    (found,) = match_submaps(furnished(np.eye(4), seed), [furnished(T, seed)], CONFIG)
     assert found is not None
     error = invert(T) @ found.T_match_query
     assert np.linalg.norm(error[:3, 3]) < 0.15
@@ -134,14 +134,12 @@ def test_any_turn_and_shift_is_found(turn: float, shift: tuple[float, float, flo
 
 def test_another_room_matches_less_and_nothing_matches_nothing() -> None:
     room = furnished(np.eye(4), 0)
-    same, other = (
-        match_submaps(room, furnished(np.eye(4), 0), CONFIG),
-        match_submaps(room, furnished(np.eye(4), 1), CONFIG),
-    )
+    same, other = match_submaps(room, [furnished(np.eye(4), 0), furnished(np.eye(4), 1)], CONFIG)
     assert same is not None
     assert other is None or other.score < 0.7 * same.score
     bare = furnished(np.eye(4), 0, objects=0)
-    assert match_submaps(bare, bare, CONFIG.model_copy(update={"use_structure": False})) is None
+    assert match_submaps(bare, [bare, bare], CONFIG.model_copy(update={"use_structure": False})) == [None, None]
+    assert match_submaps(room, [], CONFIG) == []
 
 
 def test_unknown_class_names_have_groups_too() -> None:
@@ -182,4 +180,4 @@ def test_without_labels_things_are_what_is_no_structure(views: list[KeyframeView
     submap = submap_of(views, bare)
     assert 0 < len(submap.objects) < len(submap_of(views).objects)
     assert len(set(submap.objects.groups.tolist())) == 1
-    assert match_submaps(submap, submap_of(views[:9], bare), bare) is not None
+    assert match_submaps(submap, [submap_of(views[:9], bare)], bare)[0] is not None
