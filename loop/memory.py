@@ -38,3 +38,15 @@ def without_content(keyframe: Keyframe) -> Keyframe:
     no_features = Features(*(getattr(features, field.name)[:0].copy() for field in fields(Features)))
     no_cloud = Cloud(cloud.points[:0].copy(), cloud.normals[:0].copy())
     return replace(keyframe, features=no_features, cloud=no_cloud, details=None)
+
+
+def without_descriptors(keyframe: Keyframe) -> Keyframe:
+    """A keyframe that can be matched no more and adds no points to a map; where its keypoints lie is still known."""
+    cloud = keyframe.cloud
+    details = None if keyframe.details is None else _places_alone(keyframe.details)
+    no_cloud = Cloud(cloud.points[:0].copy(), cloud.normals[:0].copy())
+    return replace(keyframe, features=_places_alone(keyframe.features), cloud=no_cloud, details=details)
+
+
+def _places_alone(features: Features) -> Features:
+    return replace(features, descriptors=features.descriptors[:0].copy(), points=features.points[:0].copy())

@@ -1,11 +1,14 @@
 """Everything about loops that happens at a keyframe: label, propose, verify, follow (paper, section 3)."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from typing import Self
 
+import numpy as np
+
 from semslam.config import Config, LoopConfig
 from semslam.errors import ConfigError
+from semslam.geometry.se3 import rotation_angle
 from semslam.loop.detector import LoopDetector, Remembering
 from semslam.loop.following import LoopFollower
 from semslam.loop.memory import LoopMemory, without_content
@@ -26,8 +29,13 @@ from semslam.types import (
     LoopConstraint,
     LoopRejection,
     RejectionReason,
+    Transform,
     Verification,
 )
+
+KNOWN_BY = 2
+"""Kept keyframes next to a new one, by loops, from which on it says nothing new."""
+NEXT_TO_M, NEXT_TO_RAD = 0.3, np.deg2rad(20)
 
 
 class LoopSearch:
@@ -54,7 +62,7 @@ class LoopSearch:
         self._verifier = verifier
         self._follower = LoopFollower(config)
         self._closed = ClosedPlaces()
-        self._per_place = config.per_place
+        self._per_place, self._thin_beyond = config.per_place, config.thin_beyond
         self._stopwatch = stopwatch or Stopwatch()
         self._keyframes: list[Keyframe] = []
         self._forgotten: set[int] = set()
@@ -111,7 +119,13 @@ class LoopSearch:
         outcomes = [self._verify(candidate) for candidate in candidates]
         while (further := self._follower.propose(self._keyframes)) is not None:
             outcomes.append(self._verify(further))
+        if self._is_known(outcomes):
+            self.forget([keyframe.id])
         return outcomes
+
+    def keeps(self, id: int) -> bool:
+        """Whether a keyframe can still be proposed."""
+        return id not in self._forgotten
 
     def find(self, keyframe: Keyframe, frame: Frame, labels: LabelMap | None = None) -> list[Verification]:
         """Look for a place without taking the keyframe in; arguments and result are those of ``search``."""
@@ -157,6 +171,26 @@ class LoopSearch:
             self._follower.add(keyframe, self._keyframes[-1] if self._keyframes else None)
             self._keyframes.append(keyframe)
         self._closed.recall(memory.closed)
+
+    def _is_known(self, outcomes: Sequence[Verification]) -> bool:
+        """Whether the newest keyframe says nothing new, in a database that is large enough to ask."""
+        if len(self._keyframes) - len(self._forgotten) <= self._thin_beyond:
+            return False
+        if not isinstance(self._detector, Remembering):
+            return False
+        return sum(map(self._is_next_to, outcomes)) >= KNOWN_BY
+
+    def _is_next_to(self, outcome: Verification) -> bool:
+        """Whether the newest keyframe stands next to a candidate that can still be proposed."""
+        if isinstance(outcome, LoopConstraint):
+            T_match_query: Transform | None = outcome.T_match_query
+        elif outcome.reason is RejectionReason.REDUNDANT:
+            T_match_query = self._follower.predict(outcome.candidate.match)
+        else:
+            return False
+        if T_match_query is None or not self.keeps(outcome.candidate.match):
+            return False
+        return bool(np.linalg.norm(T_match_query[:3, 3]) < NEXT_TO_M and rotation_angle(T_match_query) < NEXT_TO_RAD)
 
     @property
     def _remembering(self) -> Remembering:

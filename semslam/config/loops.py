@@ -16,6 +16,9 @@ class LoopConfig(Section):
     per_place: int = setting(
         4, "verified loops between the same two places after which no more are verified; 0 = no maximum", ge=0
     )
+    thin_beyond: int = setting(
+        500, "keyframes up to which all can be proposed; beyond, one that loops place next to others cannot", ge=1
+    )
     delay: int = setting(1, "number of keyframes after which a loop moves the live poses", ge=0)
     max_behind: int = setting(
         3, "number of keyframes that may wait in a run in real time before candidates are left unverified", ge=0

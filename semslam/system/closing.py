@@ -45,6 +45,7 @@ class KeyframeAnswer:
     Attributes:
         keyframe: its id.
         details: its keypoints for the verification.
+        kept: whether it can be proposed to later keyframes.
         verifications: what the verification made of each candidate, in order.
         T_world_odom: (4, 4) takes poses of the keyframe's map from odometry's frame to the world as the loops have it.
         accepted: match and query of the loops that the live graph follows from this keyframe on.
@@ -56,6 +57,7 @@ class KeyframeAnswer:
 
     keyframe: int
     details: Features | None
+    kept: bool
     verifications: tuple[Verification, ...]
     T_world_odom: Transform
     accepted: tuple[tuple[int, int], ...]
@@ -102,6 +104,7 @@ class LoopClosing:
         return KeyframeAnswer(
             keyframe=keyframe.id,
             details=keyframe.details,
+            kept=self._search.keeps(keyframe.id),
             verifications=verifications,
             T_world_odom=T_world_odom,
             accepted=change.accepted,

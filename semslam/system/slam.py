@@ -14,6 +14,7 @@ from semslam.errors import GraphError
 from semslam.frontend.keyframes import KeyframeBuilder
 from semslam.frontend.odometry import Odometry, Preparing
 from semslam.geometry.se3 import adjoint, invert, orthonormalise
+from semslam.loop.memory import without_descriptors
 from semslam.loop.verification.verifier import LoopVerifier
 from semslam.plugins import load
 from semslam.runtime.stopwatch import Stopwatch
@@ -273,12 +274,15 @@ class Slam:
         for answer in answers:
             self._listener(answer)
             self._stopwatch.add(answer.calls)
-            self._keyframes[answer.keyframe] = replace(self._keyframes[answer.keyframe], details=answer.details)
+            keyframe = replace(self._keyframes[answer.keyframe], details=answer.details)
+            if not answer.kept and keyframe.id in self._observations:  # else the last adjustment matches it
+                keyframe = without_descriptors(keyframe)
+            self._keyframes[keyframe.id] = keyframe
             self._outcomes += answer.verifications
             for verification in answer.verifications:
                 if isinstance(verification, LoopConstraint):
                     self._graph.add_loop(verification)
-            self._T_world_odom[self._keyframes[answer.keyframe].map_id] = answer.T_world_odom
+            self._T_world_odom[keyframe.map_id] = answer.T_world_odom
             self._live_loops.update(dict.fromkeys(answer.accepted))
             for pair in answer.withdrawn:
                 del self._live_loops[pair]

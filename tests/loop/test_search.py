@@ -1,11 +1,14 @@
 """The search as a whole: which candidates are verified, with what, and what becomes of the others."""
 
-from dataclasses import dataclass, field
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
+import pytest
 
 from semslam.config import LoopConfig
 from semslam.geometry.camera import Intrinsics
+from semslam.loop.detector import Look
 from semslam.loop.redundancy import NEIGHBOURHOOD
 from semslam.loop.search import LoopSearch
 from semslam.types import (
@@ -34,6 +37,28 @@ class EveryOldOne:
         return [LoopCandidate(view.keyframe.id, match, 0.5, "every") for match in range(FIRST) if late]
 
     def add(self, view: KeyframeView) -> None:
+        pass
+
+
+class Forgetful(EveryOldOne):
+    """Proposes every keyframe that it was not told to forget."""
+
+    def __init__(self) -> None:
+        self.kept: list[int] = []
+
+    def query(self, view: KeyframeView) -> list[LoopCandidate]:
+        return [LoopCandidate(view.keyframe.id, match, 0.5, "every") for match in self.kept]
+
+    def add(self, view: KeyframeView) -> None:
+        self.kept.append(view.keyframe.id)
+
+    def forget(self, ids: Collection[int]) -> None:
+        self.kept = [id for id in self.kept if id not in ids]
+
+    def looks(self) -> tuple[Look, ...]:
+        return ()
+
+    def recall(self, looks: Sequence[Look]) -> None:
         pass
 
 
@@ -110,3 +135,30 @@ def test_no_two_loops_are_between_the_same_keyframes_though_their_candidates_dif
         assert len(verifier.asked) > 1
         rejected = [one for outcomes in found for one in outcomes if isinstance(one, LoopRejection)]
         assert {one.reason for one in rejected} == {RejectionReason.REDUNDANT}
+
+
+@pytest.mark.parametrize("per_place", [0, 2])
+def test_beyond_a_number_of_keyframes_those_that_say_nothing_new_are_not_kept(per_place: int) -> None:
+    detector, verifier = Forgetful(), Standing()
+    config = LoopConfig(follow=0, per_place=per_place, thin_beyond=5)
+    search = LoopSearch(detector, None, verifier, config)  # type: ignore[arg-type]
+    images = np.zeros((48, 64, 3), np.uint8), np.zeros((48, 64), np.float32)
+    for number in range(9):
+        search.search(keyframe(number), Frame(number, float(number), *images, CAMERA))
+    assert detector.kept == [0, 1, 2, 3, 4]
+    assert [search.keeps(number) for number in range(9)] == [True] * 5 + [False] * 4
+
+
+def test_a_keyframe_that_stands_elsewhere_is_kept() -> None:
+    class Apart(Standing):
+        def verify(self, query: Keyframe, match: Keyframe, candidate: LoopCandidate) -> LoopConstraint:
+            moved = np.eye(4)
+            moved[0, 3] = 0.5
+            return replace(super().verify(query, match, candidate), T_match_query=moved)
+
+    detector = Forgetful()
+    search = LoopSearch(detector, None, Apart(), LoopConfig(follow=0, per_place=0, thin_beyond=5))  # type: ignore[arg-type]
+    images = np.zeros((48, 64, 3), np.uint8), np.zeros((48, 64), np.float32)
+    for number in range(9):
+        search.search(keyframe(number), Frame(number, float(number), *images, CAMERA))
+    assert detector.kept == list(range(9))
