@@ -11,6 +11,7 @@ from enum import StrEnum
 from functools import partial
 from importlib import import_module
 from threading import Thread
+from types import FrameType
 from typing import Any, Generic, TypeVar
 
 from semslam.errors import FOREIGN, ConfigError, SemslamError
@@ -198,8 +199,12 @@ _prepared: list[Callable[[Any], Any] | BaseException] = []
 def _obey_the_parent() -> None:
     """Leave signals that go to all processes of a session to the parent, and end when it is gone."""
     for name in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        signal.signal(name, signal.SIG_IGN)
+        signal.signal(name, _pass_over)  # unlike SIG_IGN it does not hold for programs that the work starts
     Thread(target=_end_with, args=(os.getppid(),), daemon=True).start()
+
+
+def _pass_over(number: int, frame: FrameType | None) -> None:
+    pass
 
 
 def _end_with(parent: int) -> None:

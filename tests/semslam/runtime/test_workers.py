@@ -7,7 +7,7 @@ import sys
 import time
 from collections.abc import Callable
 from functools import partial
-from operator import itemgetter
+from operator import itemgetter, methodcaller
 from pathlib import Path
 
 import pytest
@@ -18,7 +18,7 @@ from semslam.runtime.workers import WorkerKind, answer_of, make_worker, start_ah
 
 SCRIPT = """
 import os, signal, sys
-from operator import itemgetter
+from operator import itemgetter, methodcaller
 from functools import partial
 from semslam.runtime.workers import ProcessWorker
 worker = ProcessWorker(partial(itemgetter, 0))
@@ -107,6 +107,21 @@ def test_a_process_ignores_ctrl_c() -> None:
     _, process = worker.submit(1).result()
     os.kill(process, signal.SIGINT)
     assert worker.submit(1).result()[0] == 2
+    worker.close()
+
+
+def _start_a_program() -> int:
+    return subprocess.Popen(["sleep", "60"]).pid
+
+
+def test_a_program_that_a_process_starts_does_not_ignore_signals() -> None:
+    worker = make_worker(WorkerKind.PROCESS, partial(methodcaller, "__call__"))
+    program = worker.submit(_start_a_program).result()
+    os.kill(program, signal.SIGTERM)
+    deadline = time.monotonic() + 10
+    while _lives(program) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    assert not _lives(program)
     worker.close()
 
 
