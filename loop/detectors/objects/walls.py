@@ -8,6 +8,7 @@ import numpy.typing as npt
 from semslam.loop.detectors.objects.settings import ObjectsConfig
 from semslam.types import Float32Array, FloatArray, IntArray
 
+ComplexArray = npt.NDArray[np.complex128]
 BINS = 72
 """Directions of vertical surfaces, 5 degrees each."""
 UPRIGHT = 0.35
@@ -59,29 +60,30 @@ def find_walls(centres: FloatArray, facing: FloatArray, config: ObjectsConfig) -
         config: sizes and limits.
     """
     upright = np.flatnonzero(np.abs(facing[:, 2]) < UPRIGHT)
-    points, angles = centres[upright], np.arctan2(facing[upright, 1], facing[upright, 0])
+    points, normals = centres[upright], facing[upright, 0] + 1j * facing[upright, 1]
+    normals /= np.maximum(np.abs(normals), 1e-9)
     found: list[tuple[float, float, float, float, float]] = []
-    for direction in _directions(angles):
-        along = np.abs(np.angle(np.exp(1j * (angles - direction)))) < NEAR_AZIMUTH
-        found += _planes(points[along], direction, config)
+    for direction in _directions(normals):
+        found += _planes(points[_near(normals, direction)], direction, config)
     found.sort(key=lambda wall: (-wall[4], wall[0], wall[1]))
     columns = np.array(found[: config.max_walls], dtype=np.float32).reshape(-1, 5).T
     return Walls(*columns)
 
 
-def _directions(angles: FloatArray) -> list[float]:
+def _directions(normals: ComplexArray) -> list[float]:
     """Radians of the peaks of a histogram of azimuths, the highest first."""
-    bins = np.floor(angles / (2 * np.pi) * BINS).astype(np.int64) % BINS
+    bins = np.floor(np.angle(normals) / (2 * np.pi) * BINS).astype(np.int64) % BINS
     counts = _smooth(np.bincount(bins, minlength=BINS)[None].astype(np.float64))[0]
     peaks = (counts >= np.roll(counts, 1)) & (counts > np.roll(counts, -1)) & (counts > 0)
     order = np.flatnonzero(peaks)
     order = order[np.argsort(-counts[order], kind="stable")][:DIRECTIONS]
-    directions = []
-    for peak in order:
-        centre = (peak + 0.5) / BINS * 2 * np.pi
-        near = np.abs(np.angle(np.exp(1j * (angles - centre)))) < NEAR_AZIMUTH
-        directions.append(float(np.angle(np.exp(1j * angles[near]).sum())))
-    return directions
+    centres = (order + 0.5) / BINS * 2 * np.pi
+    return [float(np.angle(normals[_near(normals, centre)].sum())) for centre in centres.tolist()]
+
+
+def _near(normals: ComplexArray, direction: float) -> npt.NDArray[np.bool_]:
+    """Which unit normals (N,), x + iy, lie near a direction."""
+    return np.asarray(normals.real * np.cos(direction) + normals.imag * np.sin(direction) > np.cos(NEAR_AZIMUTH))
 
 
 def _planes(
