@@ -10,7 +10,7 @@ from semslam.loop.detectors.objects.refining import Refined, refine
 from semslam.loop.detectors.objects.settings import ObjectsConfig
 from semslam.loop.detectors.objects.submap import Submap
 from semslam.loop.detectors.objects.turning import find_turns
-from semslam.loop.detectors.objects.voting import Ballot, list_shifts, score_shifts
+from semslam.loop.detectors.objects.voting import Ballot
 from semslam.types import Float32Array, IntArray
 
 PRIOR = 4.0
@@ -93,11 +93,13 @@ def _vote(query: Submap, matches: Sequence[Submap], ballot: Ballot, config: Obje
     hypotheses: list[list[_Hypothesis]] = [[] for _ in matches]
     of, turns = find_turns(query, matches, config)
     turned = ballot.turned(of, turns)
+    shifts = turned.shifts()
+    begins = np.searchsorted(shifts.job, np.arange(len(of) + 1)).tolist()
     for job, (at, turn) in enumerate(zip(of.tolist(), turns.tolist(), strict=True)):
-        pairs = turned.of(job)
-        shifts = list_shifts(*pairs, config.radius)
-        if len(shifts):
-            hypotheses[at] += _two_best(turn, shifts, score_shifts(*pairs, shifts, config))
+        tried = slice(begins[job], begins[job + 1])
+        if tried.stop > tried.start:
+            metres = shifts.metres[tried]
+            hypotheses[at] += _two_best(turn, metres, turned.scores(job, metres))
     return [sorted(some, key=lambda one: -one.votes) for some in hypotheses]
 
 

@@ -36,9 +36,9 @@ class ObjectPairs:
         )
 
     def votes(self, x: Float32Array, y: Float32Array, tolerance: float) -> Float32Array:
-        """What each pair (..., P) adds to shifts, x and y (..., 1) or (P,)."""
-        off = (x - self.wanted[:, 0]) ** 2 + (y - self.wanted[:, 1]) ** 2
-        return np.exp(off * np.float32(-0.5 / tolerance**2)) * self.weights
+        """What each pair (P, S) adds to shifts, x and y (S,), or (P, 1) for a shift of its own."""
+        off = (x - self.wanted[:, :1]) ** 2 + (y - self.wanted[:, 1:]) ** 2
+        return np.exp(off * np.float32(-0.5 / tolerance**2)) * self.weights[:, None]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,15 +73,15 @@ class WallPairs:
         )  # fmt: skip
 
     def votes(self, x: Float32Array, y: Float32Array, tolerance: float) -> Float32Array:
-        """What each pair (..., P) adds to shifts, x and y (..., 1) or (P,), times the root of what both cover.
+        """What each pair (P, S) adds to shifts, x and y (S,) or (P, 1), times the root of what both cover.
 
         That is the share of the shorter wall's length that both cover after the shift.
         """
-        cosine, sine = self.normals.T
-        off = (x * cosine + y * sine - self.gaps) ** 2
+        cosine, sine = self.normals[:, :1], self.normals[:, 1:]
+        off = (x * cosine + y * sine - self.gaps[:, None]) ** 2
         along = y * cosine - x * sine
-        both = np.minimum(along + self.ours[:, 1], self.theirs[:, 1])
-        both -= np.maximum(along + self.ours[:, 0], self.theirs[:, 0])
-        shorter = np.minimum(self.ours[:, 1] - self.ours[:, 0], self.theirs[:, 1] - self.theirs[:, 0])
+        both = np.minimum(along + self.ours[:, 1:], self.theirs[:, 1:])
+        both -= np.maximum(along + self.ours[:, :1], self.theirs[:, :1])
+        shorter = np.minimum(self.ours[:, 1:] - self.ours[:, :1], self.theirs[:, 1:] - self.theirs[:, :1])
         covered = np.sqrt(np.clip(both / np.maximum(shorter, SHORT), 0, 1))
-        return np.asarray(np.exp(off * np.float32(-0.5 / tolerance**2)) * self.weights * covered)
+        return np.asarray(np.exp(off * np.float32(-0.5 / tolerance**2)) * self.weights[:, None] * covered)

@@ -1,7 +1,7 @@
 """Votes of pairs of objects and walls for the turn and the shift that lay a submap onto others."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -60,8 +60,21 @@ class Ballot:
         return TurnedPairs(objects, walls, len(of), self._config)
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Shifts:
+    """Horizontal shifts that are tried.
+
+    Attributes:
+        job: (S,) which of the turned matches each is for; they ascend.
+        metres: (S, 2) float32.
+    """
+
+    job: IntArray
+    metres: Float32Array
+
+
 class TurnedPairs:
-    """Pairs of objects and walls after turns, of one match and turn after the other.
+    """Pairs of objects and walls after turns, of one match and turn, a job, after the other.
 
     Attributes:
         objects: all pairs of objects.
@@ -70,8 +83,9 @@ class TurnedPairs:
 
     def __init__(self, objects: ObjectPairs, walls: WallPairs, jobs: int, config: ObjectsConfig) -> None:
         self.objects, self.walls, self._config = objects, walls, config
-        self._object_begins = np.searchsorted(objects.job, np.arange(jobs + 1)).tolist()
-        self._wall_begins = np.searchsorted(walls.job, np.arange(jobs + 1)).tolist()
+        numbers = np.arange(jobs + 1)
+        self._object_begins = np.searchsorted(objects.job, numbers)
+        self._wall_begins = np.searchsorted(walls.job, numbers)
 
     def of(self, job: int) -> tuple[ObjectPairs, WallPairs]:
         """The pairs of one match and turn."""
@@ -83,35 +97,40 @@ class TurnedPairs:
 
     def votes(self, shifts: FloatArray) -> tuple[Float32Array, Float32Array]:
         """What each pair of objects (P,) and of walls (W,) adds to the shift (J, 2) of its match and turn."""
-        x, y = shifts.T.astype(np.float32)
+        x, y = shifts.T.astype(np.float32)[:, :, None]
         config, ours, theirs = self._config, self.objects.job, self.walls.job
         return (
-            self.objects.votes(x[ours], y[ours], config.tolerance),
-            self.walls.votes(x[theirs], y[theirs], config.wall_tolerance),
+            self.objects.votes(x[ours], y[ours], config.tolerance)[:, 0],
+            self.walls.votes(x[theirs], y[theirs], config.wall_tolerance)[:, 0],
         )
 
+    def shifts(self) -> Shifts:
+        """Shifts that a pair of objects asks for, or two pairs of walls of a job that are not parallel."""
+        job, normals, gaps = self.walls.job, self.walls.normals, self.walls.gaps
+        following = np.arange(len(job)) + 1
+        second, first = _runs(following, self._wall_begins[job + 1] - following)
+        sine = normals[first, 0] * normals[second, 1] - normals[first, 1] * normals[second, 0]
+        crossing = np.flatnonzero(np.abs(sine) > MIN_SINE)
+        first, second, sine = first[crossing], second[crossing], sine[crossing]
+        a, b = normals[first], normals[second]
+        x = (gaps[first] * b[:, 1] - gaps[second] * a[:, 1]) / sine
+        y = (gaps[second] * a[:, 0] - gaps[first] * b[:, 0]) / sine
+        metres = np.concatenate([self.objects.wanted, np.stack([x, y], axis=1)])
+        jobs = np.concatenate([self.objects.job, job[first]])
+        radius = self._config.radius
+        near = np.hypot(metres[:, 0], metres[:, 1]) <= radius
+        metres, jobs = metres[near], jobs[near]
+        cells = np.rint((metres + radius) / SPACING).astype(np.int64)
+        _, kept = np.unique((jobs * 10_000 + cells[:, 0]) * 10_000 + cells[:, 1], return_index=True)
+        return Shifts(jobs[kept], metres[kept])
 
-def list_shifts(objects: ObjectPairs, walls: WallPairs, radius: float) -> Float32Array:
-    """Shifts (S, 2) that a pair of objects asks for, or two pairs of walls that are not parallel."""
-    normals, gaps = walls.normals, walls.gaps
-    sine = normals[:, :1] * normals[:, 1] - normals[:, 1:] * normals[:, 0]
-    first, second = np.nonzero(np.triu(np.abs(sine) > MIN_SINE, 1))
-    a, b, sine = normals[first], normals[second], sine[first, second]
-    x = (gaps[first] * b[:, 1] - gaps[second] * a[:, 1]) / sine
-    y = (gaps[second] * a[:, 0] - gaps[first] * b[:, 0]) / sine
-    shifts = np.concatenate([objects.wanted, np.stack([x, y], axis=1)])
-    shifts = shifts[np.hypot(shifts[:, 0], shifts[:, 1]) <= radius]
-    cells = np.rint((shifts + radius) / SPACING).astype(np.int64)
-    _, kept = np.unique(cells[:, 0] * 10_000 + cells[:, 1], return_index=True)
-    return np.asarray(shifts[kept])
-
-
-def score_shifts(objects: ObjectPairs, walls: WallPairs, shifts: Float32Array, config: ObjectsConfig) -> Float32Array:
-    """Votes (S,) of each shift (S, 2), each object and wall of the query with its best partner."""
-    x, y = shifts[:, :1], shifts[:, 1:]
-    return _best_partners(objects.votes(x, y, config.tolerance), objects.query) + _best_partners(
-        walls.votes(x, y, config.wall_tolerance), walls.query
-    )
+    def scores(self, job: int, shifts: Float32Array) -> Float32Array:
+        """Votes (S,) of each shift (S, 2) of a job, each object and wall of the query with its best partner."""
+        objects, walls = self.of(job)
+        x, y = np.ascontiguousarray(shifts.T)
+        by_objects = objects.votes(x, y, self._config.tolerance)
+        by_walls = walls.votes(x, y, self._config.wall_tolerance)
+        return _best_partners(objects.query, by_objects) + _best_partners(walls.query, by_walls)
 
 
 def _pair_objects(query: Submap, matches: Sequence[Submap], rises: FloatArray, config: ObjectsConfig) -> ObjectPairs:
@@ -178,14 +197,18 @@ def _cosines(a: Int8Array, b: Int8Array) -> FloatArray:
 
 def _slices(begins: IntArray, of: IntArray) -> tuple[IntArray, IntArray]:
     """Rows of the slices (J,) of something that begins at begins[k] and ends at begins[k + 1], and of which each is."""
-    counts = begins[of + 1] - begins[of]
-    job = np.repeat(np.arange(len(of)), counts)
-    return np.arange(len(job)) + (begins[of] - np.cumsum(counts) + counts)[job], job
+    return _runs(begins[of], begins[of + 1] - begins[of])
 
 
-def _best_partners(votes: Float32Array, owners: IntArray) -> Float32Array:
-    """Sum (S,) over owners, which ascend, of the best vote (S, P) of each."""
+def _runs(begins: IntArray, counts: IntArray) -> tuple[IntArray, IntArray]:
+    """Rows of runs (J,) that begin there and are so long, one after the other, and which run each is of."""
+    run = np.repeat(np.arange(len(counts)), counts)
+    return np.arange(len(run)) + (begins - np.cumsum(counts) + counts)[run], run
+
+
+def _best_partners(owners: IntArray, votes: Float32Array) -> Float32Array:
+    """Sum (S,) over owners, which ascend, of the best vote (P, S) of each."""
     if not len(owners):
-        return np.zeros(len(votes), dtype=np.float32)
+        return np.zeros(votes.shape[1], dtype=np.float32)
     begins = np.concatenate([[0], 1 + np.flatnonzero(owners[1:] != owners[:-1])])
-    return np.asarray(np.maximum.reduceat(votes, begins, axis=1).sum(axis=1))
+    return np.asarray(np.maximum.reduceat(votes, begins, axis=0).sum(axis=0))
