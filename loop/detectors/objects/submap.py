@@ -10,6 +10,7 @@ import numpy.typing as npt
 from semslam.geometry.se3 import Float32Array, FloatArray, invert, transform_points
 from semslam.geometry.voxels import voxel_cells, voxel_keys
 from semslam.loop.detector import Arrays
+from semslam.loop.detectors.objects.components import connected_components
 from semslam.loop.detectors.objects.labelled import FIRST_THING, FLOOR, GROUP_COUNT, VOID, LabelledCloud
 from semslam.loop.detectors.objects.settings import ObjectsConfig
 from semslam.loop.detectors.objects.upright import camera_up, find_up, level_frame
@@ -181,7 +182,7 @@ def _objects(
     clouds: Sequence[LabelledCloud], config: ObjectsConfig,
 ) -> Objects:  # fmt: skip
     """Connected voxels of one group."""
-    owners = _components(cells, winners)
+    owners = connected_components(cells, winners)
     sizes = np.bincount(owners[owners >= 0], minlength=1)
     kept = np.flatnonzero(sizes >= config.min_voxels)
     kept = kept[np.argsort(-sizes[kept], kind="stable")][: config.max_objects]
@@ -200,25 +201,6 @@ def _objects(
         quantised(classes),
         _looks(owner[rows], count, clouds),
     )
-
-
-def _components(cells: IntArray, winners: IntArray) -> IntArray:
-    """The connected component (V,) of each voxel among those of its group that touch it; -1 for structure and void."""
-    from scipy import ndimage
-
-    owners = np.full(len(cells), -1, dtype=np.int64)
-    if not len(cells):
-        return owners
-    total = 0
-    for group in np.unique(winners[winners >= FIRST_THING]):
-        rows = np.flatnonzero(winners == group)
-        own = cells[rows] - cells[rows].min(axis=0)
-        grid = np.zeros(own.max(axis=0) + 1, dtype=bool)
-        grid[tuple(own.T)] = True
-        labels, found = ndimage.label(grid, structure=np.ones((3, 3, 3)))
-        owners[rows] = total + labels[tuple(own.T)] - 1
-        total += found
-    return owners
 
 
 def _looks(owner: IntArray, count: int, clouds: Sequence[LabelledCloud]) -> Int8Array:
