@@ -7,6 +7,7 @@ import numpy as np
 
 from semslam.config import Config, KeyframeConfig
 from semslam.features import FeatureExtractor
+from semslam.frontend.moving import make_movers, standing_at
 from semslam.frontend.rolling_shutter import still, still_cloud, velocity_of
 from semslam.frontend.surface import make_cloud
 from semslam.geometry.se3 import Transform, invert, orthonormalise, rotation_angle
@@ -98,6 +99,7 @@ class KeyframeBuilder:
         self._policy = policy or ByTimeAndMotion(config.keyframes)
         self._extractor = FeatureExtractor(config.keypoints)
         self._details = DetailExtractor(config) if details else None
+        self._movers = make_movers(config.dynamics)
         self._pose = TrackedPose(-1, 0.0, np.eye(4), 0)
         self._velocity: FloatArray | None = None
         self._is_tracked = False
@@ -137,14 +139,20 @@ class KeyframeBuilder:
         self._last = self._pose
         return self.build_at(frame, self._pose.T_odom_cam, self._pose.map_id, self._velocity)
 
+    def standing(self, frame: Frame) -> Frame:
+        """The frame of the newest keyframe without depth where something moves."""
+        return self._movers.standing(frame)
+
     def build_at(
         self, frame: Frame, T_odom_cam: Transform, map_id: int = 0, velocity: FloatArray | None = None
     ) -> Keyframe:
         """Make a frame whose pose is known from elsewhere a keyframe: features and a thinned cloud stay, no images.
 
         Keyframes are numbered from 0 in the order in which they are built. Where the camera's velocity is known, what a
-        rolling shutter has bent is straightened by it.
+        rolling shutter has bent is straightened by it. What moves is left out.
         """
+        frame = standing_at(self._movers, frame, T_odom_cam, map_id)
+        features = self._movers.standing_features(self._extractor.extract(frame), frame.intrinsics)
         keyframe = Keyframe(
             id=self._count,
             frame_index=frame.index,
@@ -152,7 +160,7 @@ class KeyframeBuilder:
             T_odom_cam=T_odom_cam,
             map_id=map_id,
             intrinsics=frame.intrinsics,
-            features=still(self._extractor.extract(frame), frame, velocity),
+            features=still(features, frame, velocity),
             cloud=still_cloud(make_cloud(frame, self._config), frame, velocity),
             velocity=velocity,
         )

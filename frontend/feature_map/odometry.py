@@ -15,6 +15,7 @@ from semslam.frontend.feature_map.mapping import Mapper
 from semslam.frontend.feature_map.readout import ReadoutEstimate
 from semslam.frontend.feature_map.relocalisation import match_and_solve, relocalise
 from semslam.frontend.feature_map.settings import FeatureMapConfig
+from semslam.frontend.moving import make_movers
 from semslam.frontend.prediction import ConstantVelocity, check_frame, first_motion, wide_covariance
 from semslam.frontend.rolling_shutter import rectify, velocity_of
 from semslam.geometry.reprojection import measure
@@ -34,7 +35,7 @@ class FeatureMapOdometry:
     """
 
     name = "feature_map"
-    reads: tuple[str, ...] = ("feature_map", "keypoints", "seed")
+    reads: tuple[str, ...] = ("feature_map", "keypoints", "dynamics", "seed")
     Settings = FeatureMapConfig
 
     def __init__(self, config: Config, bridge: Bridge | None = None) -> None:
@@ -51,6 +52,7 @@ class FeatureMapOdometry:
         self._mapper = Mapper(self._map, own)
         self._prediction = ConstantVelocity()
         self._readout = ReadoutEstimate(own.readout or 0.0, own.readout_sigma)
+        self._movers = make_movers(config.dynamics)
         self._reference: MapKeyframe | None = None
         self._T_ref_prev: FloatArray = np.eye(4)
         self._T_reported: FloatArray = np.eye(4)
@@ -85,7 +87,9 @@ class FeatureMapOdometry:
         check_frame(frame)
         with one_blas_thread():
             motion = self._track(frame)
-        self._bridge.note(frame)
+        self._bridge.note(self._movers.standing(frame))
+        if motion.status is not TrackingStatus.LOST:
+            self._movers.remember(frame, self._T_reported, self._map_id)
         return motion
 
     def _track(self, frame: Frame) -> Motion:
@@ -105,11 +109,16 @@ class FeatureMapOdometry:
         T_prev_cur = self._prediction.predict(frame.timestamp)
         view = self._view(frame, raw, velocity_of(T_prev_cur, elapsed))
         coarse = self._locate_coarsely(view, T_map_prev @ T_prev_cur)
+        guess = T_map_prev @ T_prev_cur if coarse is None else coarse.T_map_cam
+        self._movers.find(frame, guess, self._map_id)
+        raw = self._movers.standing_features(raw, frame.intrinsics)
+        velocity = view.velocity
+        if coarse is not None and self._lost_since is None:
+            velocity = velocity_of(invert(T_map_prev) @ guess, elapsed)
+        view = self._view(frame, raw, velocity)
         if coarse is None:
             return self._cross(frame, view, T_map_prev)
-        if self._lost_since is None:
-            view = self._view(frame, raw, velocity_of(invert(T_map_prev) @ coarse.T_map_cam, elapsed))
-        found = self._locate(view, coarse.T_map_cam, self._around(coarse.landmarks), self._config.narrow_radius)
+        found = self._locate(view, guess, self._around(coarse.landmarks), self._config.narrow_radius)
         if found is None:
             return self._cross(frame, view, T_map_prev)
         return self._accept(view, raw, found, T_map_prev)
@@ -193,7 +202,7 @@ class FeatureMapOdometry:
         """Where the frame does not match the map, use another kind of registration, if there is one and it succeeds."""
         found = None
         if self._lost_since is None and self._reference is not None:
-            found = self._bridge.register(frame, self._prediction.predict(frame.timestamp))
+            found = self._bridge.register(self._movers.standing(frame), self._prediction.predict(frame.timestamp))
         if found is None or self._reference is None:
             return self._lose(view)
         self._prediction.tracked(frame.timestamp, found.T_ref_cam)

@@ -5,6 +5,7 @@ Settings of a single implementation, such as one odometry, stand beside it.
 
 from semslam.config.backend import BackendConfig, BundleConfig, CovisibilityConfig
 from semslam.config.dataset import DatasetConfig
+from semslam.config.dynamics import DynamicsConfig
 from semslam.config.faults import FaultConfig, Interval, parse_faults, written_faults
 from semslam.config.keyframes import KeyframeConfig
 from semslam.config.keypoints import KeypointConfig
@@ -21,6 +22,7 @@ __all__ = [
     "Config",
     "CovisibilityConfig",
     "DatasetConfig",
+    "DynamicsConfig",
     "FaultConfig",
     "Interval",
     "KeyframeConfig",

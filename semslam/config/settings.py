@@ -12,6 +12,7 @@ from pydantic_core import InitErrorDetails, PydanticCustomError
 from semslam import plugins
 from semslam.config.backend import BackendConfig
 from semslam.config.dataset import DatasetConfig
+from semslam.config.dynamics import DynamicsConfig
 from semslam.config.keyframes import KeyframeConfig
 from semslam.config.keypoints import KeypointConfig
 from semslam.config.loops import LoopConfig
@@ -38,6 +39,7 @@ class Config(Section):
     dataset: DatasetConfig = DatasetConfig()
     keypoints: KeypointConfig = KeypointConfig()
     keyframes: KeyframeConfig = KeyframeConfig()
+    dynamics: DynamicsConfig = DynamicsConfig()
     segmentation: SegmentationConfig = SegmentationConfig()
     training: TrainingConfig = TrainingConfig()
     loops: LoopConfig = LoopConfig()

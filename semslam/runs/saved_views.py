@@ -7,6 +7,7 @@ from pathlib import Path
 from semslam.datasets import open_dataset
 from semslam.datasets.dataset import Dataset
 from semslam.errors import DatasetError, ResultsError
+from semslam.frontend.moving import make_movers, standing_at
 from semslam.maps.views import PosedView
 from semslam.runs.recording import Recording, read_front_end
 from semslam.runs.results import SavedRun, read_run
@@ -57,7 +58,7 @@ class SavedViews:
         return replace(self, keyframes=kept)
 
     def read(self, progress: Progress = silent) -> Iterator[PosedView]:
-        """Read the keyframes' images one by one.
+        """Read the keyframes' images one by one, without depth where something moves if the run left that out.
 
         Args:
             progress: called with the keyframes done and in all.
@@ -65,8 +66,10 @@ class SavedViews:
         Raises:
             DatasetError: an image can no longer be read.
         """
+        movers = make_movers(self.run.config.dynamics)
         for done, keyframe in enumerate(self.keyframes, start=1):
-            yield PosedView(keyframe.id, self.dataset.frame(keyframe.frame), keyframe.T_world_cam)
+            frame = standing_at(movers, self.dataset.frame(keyframe.frame), keyframe.T_world_cam)
+            yield PosedView(keyframe.id, frame, keyframe.T_world_cam)
             progress(done, len(self.keyframes))
 
 

@@ -249,7 +249,7 @@ class Slam:
         odometry = self._connect(keyframe)
         covisible = self._observe(keyframe, motion.observations)
         if self._queue is not None:
-            self._queue.add(KeyframeJob(keyframe, frame, odometry, covisible))
+            self._queue.add(KeyframeJob(keyframe, self._builder.standing(frame), odometry, covisible))
         return keyframe
 
     def _connect(self, keyframe: Keyframe) -> Edge | None:

@@ -2,6 +2,9 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+import numpy.typing as npt
+
 from semslam.types.arrays import Float32Array, UInt8Array
 
 
@@ -27,6 +30,17 @@ class Features:
 
     def __len__(self) -> int:
         return len(self.pixels)
+
+    def take(self, chosen: npt.NDArray[np.generic]) -> "Features":
+        """Some of the keypoints, given by indices or by a mask."""
+        return Features(
+            self.pixels[chosen],
+            self.depths[chosen],
+            self.octaves[chosen],
+            self.angles[chosen],
+            self.descriptors[chosen],
+            self.points[chosen],
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,0 +1,96 @@
+"""What moves is found by free space alone, and left out of tracking and of keyframes."""
+
+from functools import lru_cache
+
+import numpy as np
+import pytest
+
+from semslam.config import Config
+from semslam.datasets.synthetic import Request, SyntheticDataset, labels
+from semslam.eval.trajectory import score_trajectory
+from semslam.frontend.feature_map.odometry import FeatureMapOdometry
+from semslam.frontend.keyframes import KeyframeBuilder
+from semslam.frontend.moving import FreeSpaceMovers, standing_at
+from semslam.geometry.se3 import compose
+from semslam.types import Frame, Trajectory
+
+PERSON = SyntheticDataset("room", Request(people=1))
+FIRST, LAST = 18, 34
+"""Frames in which the person comes into view and crosses it."""
+LEAVING_OUT = Config().with_changes(dynamics={"free_space": True})
+
+
+@lru_cache(maxsize=LAST)
+def frame(index: int) -> Frame:
+    return PERSON.frame(index)
+
+
+def small(people: int) -> SyntheticDataset:
+    return SyntheticDataset("room", Request(people=people, width=160))
+
+
+def ate(config: Config) -> float:
+    """Of the causal poses, metres."""
+    odometry = FeatureMapOdometry.from_config(config)
+    frames = [frame(index) for index in range(FIRST, LAST)]
+    poses = compose([odometry.track(each).T_prev_cur for each in frames][1:], np.eye(4))
+    stamps = np.array([each.timestamp for each in frames])
+    error = score_trajectory(Trajectory(stamps, poses), PERSON.ground_truth).ate_rmse_m
+    assert error is not None
+    return error
+
+
+def test_a_crossing_person_does_not_pull_the_camera_along() -> None:
+    assert ate(LEAVING_OUT) < 0.5 * ate(Config())
+
+
+def test_a_person_is_found_and_nothing_else() -> None:
+    dataset, movers = small(people=1), FreeSpaceMovers()
+    found, person = [], []
+    for index in range(16, 31):
+        seen = dataset.frame(index)
+        standing = standing_at(movers, seen, dataset.ground_truth.poses[index])
+        found.append((standing.depth == 0) & (seen.depth > 0))
+        person.append((dataset.labels(index) == labels.PERSON) & (seen.depth > 0))
+        assert np.array_equal(standing.depth[~found[-1]], seen.depth[~found[-1]])
+    recall, precision = (np.logical_and(found, person).sum() / np.sum(of) for of in (person, found))
+    assert recall > 0.7
+    assert precision > 0.9
+
+
+def test_where_nothing_moves_nothing_is_found() -> None:
+    dataset, movers = small(people=0), FreeSpaceMovers()
+    for index in range(40, 60, 2):
+        seen = dataset.frame(index)
+        assert standing_at(movers, seen, dataset.ground_truth.poses[index]) is seen
+
+
+def test_a_change_between_two_maps_is_no_motion() -> None:
+    dataset, movers = small(people=1), FreeSpaceMovers()
+    standing_at(movers, dataset.frame(16), dataset.ground_truth.poses[16], map_id=0)
+    seen = dataset.frame(26)
+    assert standing_at(movers, seen, dataset.ground_truth.poses[26], map_id=1) is seen
+
+
+@pytest.mark.parametrize("depth", [0.0, np.nan])
+def test_frames_without_depth_are_as_they_were(depth: float) -> None:
+    seen, movers = small(people=1).frame(20), FreeSpaceMovers()
+    blind = Frame(20, seen.timestamp, seen.color, np.full_like(seen.depth, depth), seen.intrinsics)
+    for _ in range(2):
+        assert standing_at(movers, blind, np.eye(4)) is blind
+    assert standing_at(movers, seen, np.eye(4)) is seen
+
+
+def test_keyframes_hold_no_person() -> None:
+    on_person = {}
+    for name, config in (("left out", LEAVING_OUT), ("as seen", Config())):
+        builder = KeyframeBuilder(config, details=False)
+        for index in range(FIRST, LAST, 3):
+            keyframe = builder.build_at(frame(index), PERSON.ground_truth.poses[index])
+        camera = keyframe.intrinsics
+        person = PERSON.labels(index) == labels.PERSON
+        u, v = np.rint(camera.project(keyframe.cloud.points)).astype(int).T
+        x, y = np.rint(keyframe.features.pixels).astype(int).T
+        on_person[name] = np.array([person[v, u].sum(), person[y, x].sum()])
+    assert (on_person["as seen"] > 20).all()
+    assert (on_person["left out"] < 0.2 * on_person["as seen"]).all()
