@@ -8,10 +8,10 @@ the one before, behind the photos of NYUv2, each a map by itself; a photo's dept
 5 m. Every ``--ask``-th keyframe queries all before it, and what the detector proposes is verified. Sequences whose
 names up to the "?" are the same are one place: a verified loop between two places is false, for no odometry could
 refuse it.
-Printed for each verified loop between two places: both, and its score. Then for each detector: keyframes; bytes kept
-of each by the detector, mean and largest; processor milliseconds of the last queries, description included and
-segmentation not; proposals and verified loops between two places; verified loops within a place, and those of them that
-miss the true pose by over 0.5 m or 20 degrees.
+Printed for each false loop, between two places or within one: both keyframes and their places, its score and evidence.
+Then for each detector: keyframes; bytes kept of each by the detector, mean and largest; processor milliseconds of the
+last queries, description included and segmentation not; proposals and verified loops between two places; verified loops
+within a place, and those of them that miss the true pose by over 0.5 m or 20 degrees.
 """
 
 import argparse
@@ -40,7 +40,7 @@ PAUSE = 1000.0
 """Seconds between two sequences."""
 PHOTO_SIZE, PHOTO_FOCAL, PHOTO_DEPTH = (640, 480), 518.0, 5.0
 """Pixels, pixels, and metres that the brightest depth of a photo stands for."""
-TIMED = 50
+TIMED = 20
 """Queries at the end whose time counts."""
 FALSE_METRES, FALSE_DEGREES = 0.5, 20.0
 
@@ -141,11 +141,15 @@ def ask(
         tally.proposed_across += across
         outcome = verifier.verify(*ends_of(candidate, keyframes), candidate)
         if isinstance(outcome, LoopConstraint):
-            if across:
-                print(f"{shots[candidate.query][0]} - {shots[candidate.match][0]}: {candidate.score:.2f}", flush=True)
+            false = not across and is_false(outcome, shots)
             tally.verified_across += across
             tally.verified += not across
-            tally.false += not across and is_false(outcome, shots)
+            tally.false += false
+            if across or false:
+                places = (
+                    f"{shots[candidate.query][0]} {candidate.query} - {shots[candidate.match][0]} {candidate.match}"
+                )
+                print(f"{places}: score {candidate.score:.2f}, {candidate.evidence.figures}", flush=True)
 
 
 def is_false(loop: LoopConstraint, shots: Sequence[tuple[str, Transform]]) -> bool:

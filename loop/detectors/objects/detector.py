@@ -80,7 +80,8 @@ class ObjectsDetector(RememberingDetector[Submap]):
         matches = dict(zip(shortlist, found, strict=True))
         scores = np.zeros(len(self._timeline))
         for at, match in matches.items():
-            scores[at] = 0.0 if match is None else match.score
+            if match is not None and len(match.objects) >= self._config.min_objects:
+                scores[at] = match.score
         candidates = []
         for at in self._timeline.best(view.keyframe, scores):
             match = matches[at]

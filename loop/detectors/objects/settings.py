@@ -26,4 +26,7 @@ class ObjectsConfig(Section):
     use_look: bool = setting(True, "compare how objects look")
     use_structure: bool = setting(True, "match walls too")
     use_up: bool = setting(True, "find up by the floor and other surfaces; without, cameras are taken to be level")
+    min_objects: int = setting(
+        4, "number of matched objects that makes a candidate; walls alone meet in any corner", ge=0
+    )
     min_score: float = setting(0.2, "share of matched objects and walls that makes a candidate", ge=0, le=1)
