@@ -80,13 +80,13 @@ class ObjectsDetector(RememberingDetector[Submap]):
         matches = dict(zip(shortlist, found, strict=True))
         scores = np.zeros(len(self._timeline))
         for at, match in matches.items():
-            if match is not None and len(match.objects) >= self._config.min_objects:
-                scores[at] = match.score
+            scores[at] = 0.0 if match is None else match.score
         candidates = []
         for at in self._timeline.best(view.keyframe, scores):
             match = matches[at]
             assert match is not None
-            candidates.append(self._candidate(view, submap, at, match))
+            if len(match.objects) >= self._config.min_objects:
+                candidates.append(self._candidate(view, submap, at, match))
         return candidates
 
     def add(self, view: KeyframeView) -> None:
