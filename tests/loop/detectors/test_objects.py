@@ -4,12 +4,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy import ndimage
 
 from semslam.config import Config
 from semslam.datasets import open_dataset
 from semslam.datasets.synthetic import SyntheticDataset
 from semslam.frontend.keyframes import KeyframeBuilder
 from semslam.geometry.se3 import FloatArray, exp_so3, invert, make_transform, rotation_angle
+from semslam.loop.detectors.objects.components import connected_components
 from semslam.loop.detectors.objects.detector import ObjectsDetector
 from semslam.loop.detectors.objects.labelled import GROUP_COUNT, GROUP_LIST, group_of_names, label_cloud
 from semslam.loop.detectors.objects.matching import match_submaps
@@ -163,6 +165,32 @@ def test_submaps_of_a_loop_share_no_keyframe(views: list[KeyframeView]) -> None:
             proposed += 1
         detector.add(view)
     assert proposed
+
+
+def test_few_matched_objects_make_no_candidate(views: list[KeyframeView]) -> None:
+    changes = {"loops": {"min_gap": 2.0, "min_score": 0.0}, "objects": {"max_age": 3.0, "min_objects": 30}}
+    detector = ObjectsDetector.from_config(Config().with_changes(**changes))
+    for view in views:
+        assert detector.query(view) == []
+        detector.add(view)
+
+
+@settings(max_examples=25, deadline=None)
+@given(seed=st.integers(0, 1000), count=st.integers(0, 200))
+def test_components_are_those_of_each_group(seed: int, count: int) -> None:
+    rng = np.random.default_rng(seed)
+    cells = np.unique(rng.integers(-4, 4, (count, 3)), axis=0)
+    winners = rng.integers(0, 7, len(cells))
+    owners = connected_components(cells, winners)
+    assert ((owners < 0) == (winners < 4)).all()
+    total = 0
+    for group in range(4, 7):
+        grid = np.zeros((8, 8, 8), dtype=bool)
+        own = cells[winners == group] + 4
+        grid[tuple(own.T)] = True
+        labels, found = ndimage.label(grid, structure=np.ones((3, 3, 3)))
+        assert owners[winners == group].tolist() == (total + labels[tuple(own.T)] - 1).tolist()
+        total += found
 
 
 def test_a_damaged_submap_is_refused() -> None:
