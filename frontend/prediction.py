@@ -35,6 +35,10 @@ class ConstantVelocity:
         step = self._velocity * (timestamp - self._timestamp)
         return make_transform(exp_so3(step[:3]), step[3:])
 
+    def velocity(self, timestamp: float) -> FloatArray:
+        """Predicted angular and linear velocity (6,) at a time, radians and metres a second in the camera's frame."""
+        return self._velocity if timestamp - self._tracked_at <= COAST_SECONDS else np.zeros(6)
+
     def tracked(self, timestamp: float, T_prev_cur: Transform) -> None:
         """Take in a measured motion from the last frame to the one at ``timestamp``."""
         elapsed = timestamp - self._timestamp if self._timestamp is not None else 0.0

@@ -11,7 +11,7 @@ from semslam.frontend.frame_to_frame.reference import ReferenceOdometry, Registr
 from semslam.geometry.camera import Intrinsics
 from semslam.geometry.se3 import adjoint, invert, is_rigid
 from semslam.runtime.threads import one_open3d_thread
-from semslam.types import Frame, Transform
+from semslam.types import FloatArray, Frame, Transform
 
 MIN_SIZE = 32
 """Pixels; smaller images have no pyramid."""
@@ -56,8 +56,12 @@ class DenseRegistrar:
     def __init__(self, config: DenseConfig) -> None:
         self._config = config
 
-    def prepare(self, frame: Frame) -> DenseView | None:
-        """Undistort the images; None where they are tiny, black or nearly without depth."""
+    def prepare(self, frame: Frame, velocity: FloatArray | None = None) -> DenseView | None:
+        """Undistort the images; None where they are tiny, black or nearly without depth.
+
+        Rows stay as they were read out: straightened images were tried, and register no better.
+        """
+        del velocity
         depth = np.where((frame.depth > 0) & (frame.depth <= self._config.max_depth), frame.depth, 0).astype(np.float32)
         if min(depth.shape) < MIN_SIZE or np.count_nonzero(depth) < self._config.min_coverage * depth.size:
             return None

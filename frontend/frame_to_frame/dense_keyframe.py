@@ -7,7 +7,7 @@ from semslam.config import Config
 from semslam.frontend.frame_to_frame.dense import DenseConfig, DenseOdometry, DenseRegistrar, DenseView
 from semslam.frontend.frame_to_frame.feature import FeatureRegistrar, FeatureView
 from semslam.frontend.frame_to_frame.reference import Reach, ReferenceOdometry, Registration
-from semslam.types import Frame, Transform
+from semslam.types import FloatArray, Frame, Transform
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -21,9 +21,9 @@ class _Registrar:
         self._dense = DenseRegistrar(config.section(DenseOdometry.name, DenseConfig))
         self._features = FeatureRegistrar(config)
 
-    def prepare(self, frame: Frame) -> _View | None:
+    def prepare(self, frame: Frame, velocity: FloatArray) -> _View | None:
         dense = self._dense.prepare(frame)
-        return None if dense is None else _View(dense, self._features.prepare(frame))
+        return None if dense is None else _View(dense, self._features.prepare(frame, velocity))
 
     def register(self, reference: _View, current: _View, T_ref_cam: Transform) -> Registration | None:
         if reference.features is not None and current.features is not None:

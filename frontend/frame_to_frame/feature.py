@@ -8,7 +8,8 @@ import numpy as np
 from semslam.config import Config, Section, setting
 from semslam.features import FeatureExtractor, match_descriptors, solve_pnp
 from semslam.frontend.frame_to_frame.reference import ReferenceOdometry, Registration
-from semslam.types import Features, Frame, Intrinsics, Transform
+from semslam.frontend.rolling_shutter import still
+from semslam.types import Features, FloatArray, Frame, Intrinsics, Transform
 
 
 class FeatureOdometryConfig(Section):
@@ -35,9 +36,9 @@ class FeatureRegistrar:
         self._seed = config.seed
         self._extractor = FeatureExtractor(config.keypoints)
 
-    def prepare(self, frame: Frame) -> FeatureView | None:
-        """Find keypoints; None where too few have depth."""
-        features = self._extractor.extract(frame)
+    def prepare(self, frame: Frame, velocity: FloatArray) -> FeatureView | None:
+        """Find keypoints, as a global shutter would see them; None where too few have depth."""
+        features = still(self._extractor.extract(frame), frame, velocity)
         if np.count_nonzero(features.depths) < self._config.min_inliers:
             return None
         return FeatureView(features, frame.intrinsics)

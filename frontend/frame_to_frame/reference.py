@@ -35,8 +35,14 @@ class Registration:
 class Registrar(Protocol[ViewT]):
     """Turns frames into views and registers them to one another."""
 
-    def prepare(self, frame: Frame) -> ViewT | None:
-        """What is needed of a frame to be tracked, or None where it holds too little."""
+    def prepare(self, frame: Frame, velocity: FloatArray) -> ViewT | None:
+        """What is needed of a frame to be tracked, or None where it holds too little.
+
+        Args:
+            frame: its images.
+            velocity: (6,) predicted, radians and metres a second in the camera's frame. Who takes a rolling shutter out
+                does so here: a view that is the same as the current one and as the reference adds up no error.
+        """
 
     def register(self, reference: ViewT, current: ViewT, T_ref_cam: Transform) -> Registration | None:
         """Register ``current`` to ``reference`` from an initial guess, or None where they do not match."""
@@ -89,7 +95,7 @@ class ReferenceOdometry(Generic[ViewT]):
             DatasetError: the frame's size does not fit its intrinsics.
         """
         check_frame(frame)
-        view = self._registrar.prepare(frame)
+        view = self._registrar.prepare(frame, self._prediction.velocity(frame.timestamp))
         if not self._started:
             self._started = True
             self._prediction.tracked(frame.timestamp, np.eye(4))
