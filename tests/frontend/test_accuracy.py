@@ -30,7 +30,7 @@ def track(name: str, path: Path, **selection: int) -> tuple[list[Motion], float]
 @pytest.mark.parametrize(
     ("name", "sequence", "frames", "limit"),
     [
-        ("feature", RPY, 150, 0.10),
+        ("feature", RPY, 150, 0.05),
         ("feature", KITCHEN, 150, 0.06),
         ("dense", RPY, 40, 0.08),
         ("dense", KITCHEN, 40, 0.04),
