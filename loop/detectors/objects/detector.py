@@ -87,7 +87,8 @@ class ObjectsDetector(RememberingDetector[Submap]):
             assert match is not None
             if len(match.objects) >= self._config.min_objects:
                 candidates.append(self._candidate(view, submap, at, match))
-        return candidates
+        least_views = self._config.min_keyframes
+        return [c for c in candidates if c.guess and min(len(c.guess.query), len(c.guess.match)) >= least_views]
 
     def add(self, view: KeyframeView) -> None:
         """Remember the view's submap, and its cloud for the submaps of the next keyframes."""

@@ -9,6 +9,7 @@ class ObjectsConfig(Section):
     reach: float = setting(4.0, "way that the camera went within a submap", unit="m", gt=0)
     max_age: float = setting(9.0, "time that a submap spans", unit="s", gt=0)
     max_keyframes: int = setting(24, "maximum number of keyframes of a submap", gt=0)
+    min_keyframes: int = setting(3, "number of keyframes below which a submap makes no candidate", gt=0)
     max_depth: float = setting(5.0, "depth up to which points count", unit="m", gt=0)
     voxel: float = setting(0.1, "side of the voxels that votes are counted in", unit="m", gt=0)
     min_voxels: int = setting(6, "number of voxels that make an object", gt=0)

@@ -153,7 +153,9 @@ def test_unknown_class_names_have_groups_too() -> None:
 
 
 def test_submaps_of_a_loop_share_no_keyframe(views: list[KeyframeView]) -> None:
-    config = Config().with_changes(loops={"min_gap": 2.0, "min_score": 0.0}, objects={"max_age": 3.0})
+    config = Config().with_changes(
+        loops={"min_gap": 2.0, "min_score": 0.0}, objects={"max_age": 3.0, "min_keyframes": 1}
+    )
     detector = ObjectsDetector.from_config(config)
     proposed = 0
     for view in views:
@@ -167,8 +169,9 @@ def test_submaps_of_a_loop_share_no_keyframe(views: list[KeyframeView]) -> None:
     assert proposed
 
 
-def test_few_matched_objects_make_no_candidate(views: list[KeyframeView]) -> None:
-    changes = {"loops": {"min_gap": 2.0, "min_score": 0.0}, "objects": {"max_age": 3.0, "min_objects": 30}}
+@pytest.mark.parametrize("limit", ["min_objects", "min_keyframes"])
+def test_few_matched_objects_or_keyframes_make_no_candidate(views: list[KeyframeView], limit: str) -> None:
+    changes = {"loops": {"min_gap": 2.0, "min_score": 0.0}, "objects": {"max_age": 3.0, limit: 30}}
     detector = ObjectsDetector.from_config(Config().with_changes(**changes))
     for view in views:
         assert detector.query(view) == []
