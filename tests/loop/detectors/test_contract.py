@@ -8,6 +8,8 @@ from semslam.testing import DetectorContract
 from semslam.testing.scenes import place
 
 ANY_SCORE = {"min_score": 0.0}
+SINGLE_VIEWS = {"min_objects": 0, "min_keyframes": 1}
+"""The contract's places are one view each of little."""
 
 
 class TestDetector(DetectorContract):
@@ -17,6 +19,7 @@ class TestDetector(DetectorContract):
         name = str(request.getfixturevalue("example_plugin") if outside else request.param)
         self.implementation = plugins.load("semslam.detectors", name)
         self.proposes = name != "none"
+        self.config = Config().with_changes(loops=ANY_SCORE, objects=SINGLE_VIEWS)
         assert self.implementation.name == name
 
 
