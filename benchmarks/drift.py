@@ -280,7 +280,7 @@ def main() -> None:
     measuring.add_argument("sequences", nargs="+")
     measuring.add_argument("--folder", type=Path, required=True)
     measuring.add_argument("--odometries", default="feature,dense,kiss,feature_map")
-    measuring.add_argument("--once", default="dense_keyframe,auto", help="odometries for the first start alone")
+    measuring.add_argument("--once", default="dense_keyframe", help="odometries for the first start alone")
     measuring.add_argument("--detectors", default="none,semantic,fused")
     measuring.add_argument("--starts", default="0,2,4,6,8")
     measuring.add_argument("--max-frames", type=int)

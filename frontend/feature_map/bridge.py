@@ -1,53 +1,91 @@
-"""Registration of frames that do not match the tracker's map to the frame before."""
+"""Frames with too few landmarks are registered to the last tracked one by their images: colour and depth."""
 
-from typing import Protocol
+from collections.abc import Sequence
 
-from semslam.frontend.frame_to_frame.dense import DenseConfig, DenseRegistrar
-from semslam.frontend.frame_to_frame.reference import Registration
-from semslam.types import Frame, Transform
+import numpy as np
 
+from semslam.frontend.direct.alignment import Belief
+from semslam.frontend.direct.search import Registered, register
+from semslam.frontend.direct.view import Level, make_levels
+from semslam.frontend.prediction import wide_covariance
+from semslam.geometry.se3 import invert, tangent
+from semslam.types import Covariance6, FloatArray, Frame, Transform
 
-class Bridge(Protocol):
-    """Registers a frame to the one before, without a map."""
-
-    def note(self, frame: Frame) -> None:
-        """Remember a frame as the one before the next."""
-
-    def register(self, frame: Frame, T_prev_cur: Transform) -> Registration | None:
-        """Motion since the noted frame from an initial guess, or None where the two do not match."""
-
-
-class NoBridge:
-    """Registers nothing."""
-
-    def note(self, frame: Frame) -> None:
-        """Remember nothing."""
-
-    def register(self, frame: Frame, T_prev_cur: Transform) -> Registration | None:
-        """None."""
-        del frame, T_prev_cur
-        return None
+RESTLESS_ROTATION, RESTLESS_TRANSLATION = 6.0, 2.5
+"""Standard deviation of a hand-held camera's acceleration, rad/s² and m/s²."""
+INEXACT = 0.01
+"""Share of a motion by which calibration falsifies it."""
+BENT = 0.4
+"""Share of the motion during a read-out: images are registered as if all rows were of one instant."""
+MIN_CONTRAST = 4.0
+"""Standard deviation of the grey levels of a usable image: a black or a white one is a fault of the camera."""
+MAX_GAP = 0.5
+"""Seconds from the last tracked frame after which too little of it is in view."""
 
 
-class DenseBridge:
-    """Registers colour and depth of all pixels, which works where there are few corners."""
+class Bridge:
+    """The last tracked frame, how it moved, and registration to it."""
 
-    def __init__(self, config: DenseConfig) -> None:
-        self._max_seconds = config.max_bridge
-        self._registrar = DenseRegistrar(config)
-        self._previous: Frame | None = None
+    def __init__(self) -> None:
+        self._frame: Frame | None = None
+        self._levels: tuple[Level, ...] | None = None
+        self._levels_of: Frame | None = None
+        self._velocity_covariance: FloatArray = np.eye(6)
+        self._T_tracked_prev: FloatArray = np.eye(4)
+        self._is_lost = False
 
-    def note(self, frame: Frame) -> None:
-        """Remember a frame as the one before the next."""
-        self._previous = frame
+    def tracked(self, frame: Frame, covariance: Covariance6) -> None:
+        """Note a frame that was tracked, with the covariance (6, 6) of its motion since the frame before."""
+        if self._frame is not None and not self._is_lost:
+            self._velocity_covariance = covariance / max(frame.timestamp - self._frame.timestamp, 1e-3) ** 2
+        self._frame = frame
+        self._T_tracked_prev = np.eye(4)
+        self._is_lost = False
 
-    def register(self, frame: Frame, T_prev_cur: Transform) -> Registration | None:
-        """Motion since the noted frame; None after a gap in time or where too few pixels agree."""
-        previous = self._previous
-        if previous is None or frame.timestamp - previous.timestamp > self._max_seconds:
+    def lost(self, T_prev_cur: Transform) -> None:
+        """Note the predicted motion (4, 4) of a frame that was not."""
+        self._T_tracked_prev = self._T_tracked_prev @ T_prev_cur
+        self._is_lost = True
+
+    def register(
+        self, frame: Frame, T_prev_cur: Transform, guesses: Sequence[Transform], readout: float
+    ) -> Registered | None:
+        """Motion since the frame before, or None where the images do not match.
+
+        Args:
+            frame: the frame.
+            T_prev_cur: (4, 4) predicted motion since the frame before, tracked or not.
+            guesses: (4, 4) others of it, likelier ones.
+            readout: seconds from colour's first row to its last.
+        """
+        tracked = self._frame
+        if tracked is None or frame.timestamp - tracked.timestamp > MAX_GAP or frame.color.std() < MIN_CONTRAST:
             return None
-        reference, current = self._registrar.prepare(previous), self._registrar.prepare(frame)
+        reference, current = self._levels_for(tracked), make_levels(frame)
         if reference is None or current is None:
             return None
-        found = self._registrar.register(reference, current, T_prev_cur)
-        return None if found is None or found.degraded else found
+        T_tracked_prev = self._T_tracked_prev
+        information = _inverse(self._expected(frame.timestamp - tracked.timestamp))
+        starts = [T_tracked_prev @ guess for guess in (*guesses, T_prev_cur)]
+        found = register(reference, current, starts, Belief(starts[-1], information))
+        self._levels, self._levels_of = current, frame
+        if found is None:
+            return None
+        share = INEXACT + BENT * readout / (frame.timestamp - tracked.timestamp)
+        unmodelled = np.diag((share * tangent(found.T_ref_cam)) ** 2)
+        information = _inverse(_inverse(found.information) + unmodelled)
+        return Registered(invert(T_tracked_prev) @ found.T_ref_cam, information)
+
+    def _expected(self, seconds: float) -> Covariance6:
+        """Covariance (6, 6) of the motion predicted over a time: velocity is known in part, and changes."""
+        if self._is_lost:
+            return wide_covariance(seconds)
+        change = np.array([RESTLESS_ROTATION] * 3 + [RESTLESS_TRANSLATION] * 3) * seconds**2
+        return self._velocity_covariance * seconds**2 + np.diag(change**2)
+
+    def _levels_for(self, frame: Frame) -> tuple[Level, ...] | None:
+        return self._levels if self._levels_of is frame else make_levels(frame)
+
+
+def _inverse(matrix: FloatArray) -> FloatArray:
+    return np.asarray(np.linalg.inv(matrix), dtype=np.float64)

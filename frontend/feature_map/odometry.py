@@ -1,16 +1,17 @@
 """Odometry against a map of landmarks that it builds and adjusts as it goes."""
 
+from dataclasses import replace
 from typing import Self
 
 import numpy as np
 
 from semslam.config import Config
 from semslam.features import FeatureExtractor
-from semslam.frontend.feature_map.bridge import Bridge, NoBridge
+from semslam.frontend.feature_map.bridge import Bridge
 from semslam.frontend.feature_map.depth_instant import at_color
 from semslam.frontend.feature_map.landmarks import NONE
 from semslam.frontend.feature_map.local_map import LocalMap, MapKeyframe
-from semslam.frontend.feature_map.map_pose import Located, View, locate
+from semslam.frontend.feature_map.map_pose import NOTHING, Located, View, combine, locate
 from semslam.frontend.feature_map.mapping import Mapper
 from semslam.frontend.feature_map.readout import ReadoutEstimate
 from semslam.frontend.feature_map.relocalisation import match_and_solve, relocalise
@@ -23,24 +24,26 @@ from semslam.geometry.se3 import invert, rotation_angle, transform_points
 from semslam.runtime.threads import one_blas_thread
 from semslam.types import Features, FloatArray, Frame, IntArray, Motion, Observations, TrackingStatus, Transform
 
-NOTHING: IntArray = np.zeros(0, dtype=np.int64)
+FEW = 6
+"""Landmarks that support a pose which the images give."""
 
 
 class FeatureMapOdometry:
     """Tracks frames against the covisible part of a map (after ORB-SLAM2, Mur-Artal and Tardós, T-RO 2017).
 
     A frame's pose is predicted, landmarks of the map are looked for where they should be, and the pose is refined on
-    their pixels and disparities. Keyframes extend the map; the newest are adjusted together, one step a frame. A frame
-    that cannot be tracked is looked for in all maps; where that fails for a while, a new map starts.
+    their pixels and disparities. Where there are few, brightness and depth of all pixels are registered to the frame
+    before, and both make one estimate. Keyframes extend the map; the newest are adjusted together, one step a frame. A
+    frame that cannot be tracked is looked for in all maps; where that fails for a while, a new map starts.
     """
 
     name = "feature_map"
     reads: tuple[str, ...] = ("feature_map", "keypoints", "dynamics", "seed")
     Settings = FeatureMapConfig
 
-    def __init__(self, config: Config, bridge: Bridge | None = None) -> None:
+    def __init__(self, config: Config) -> None:
         own = self._config = config.section(FeatureMapOdometry.name, FeatureMapConfig)
-        self._bridge = bridge or NoBridge()
+        self._bridge = Bridge()
         self._seed = config.seed
         # Fewer and wider levels than the verification's: cheaper, and landmarks are placed better.
         self._scale = own.scale
@@ -87,8 +90,10 @@ class FeatureMapOdometry:
         check_frame(frame)
         with one_blas_thread():
             motion = self._track(frame)
-        self._bridge.note(self._movers.standing(frame))
-        if motion.status is not TrackingStatus.LOST:
+        if motion.status is TrackingStatus.LOST:
+            self._bridge.lost(motion.T_prev_cur)
+        else:
+            self._bridge.tracked(self._movers.standing(frame), motion.covariance)
             self._movers.remember(frame, self._T_reported, self._map_id)
         return motion
 
@@ -104,24 +109,26 @@ class FeatureMapOdometry:
             self._prediction.tracked(frame.timestamp, np.eye(4))
             self._start_map(self._view(frame, raw, np.zeros(6)))
             return first_motion()
-        elapsed = self._prediction.seconds_since_last(frame.timestamp)
         T_map_prev = self._pose_of_previous()
-        T_prev_cur = self._prediction.predict(frame.timestamp)
-        view = self._view(frame, raw, velocity_of(T_prev_cur, elapsed))
-        coarse = self._locate_coarsely(view, T_map_prev @ T_prev_cur)
-        guess = T_map_prev @ T_prev_cur if coarse is None else coarse.T_map_cam
+        predicted = self._prediction.predict(frame.timestamp)
+        view = self._view(frame, raw, self._velocity(frame, predicted))
+        coarse = self._locate_coarsely(view, T_map_prev @ predicted)
+        guess = T_map_prev @ predicted if coarse is None else coarse.T_map_cam
         self._movers.find(frame, guess, self._map_id)
         raw = self._movers.standing_features(raw, frame.intrinsics)
         velocity = view.velocity
         if coarse is not None and self._lost_since is None:
-            velocity = velocity_of(invert(T_map_prev) @ guess, elapsed)
+            velocity = self._velocity(frame, invert(T_map_prev) @ guess)
         view = self._view(frame, raw, velocity)
-        if coarse is None:
-            return self._cross(frame, view, T_map_prev)
-        found = self._locate(view, guess, self._around(coarse.landmarks), self._config.narrow_radius)
-        if found is None:
-            return self._cross(frame, view, T_map_prev)
-        return self._accept(view, raw, found, T_map_prev)
+        found = None
+        if coarse is not None:
+            found = self._locate(view, guess, self._around(coarse.landmarks), self._config.narrow_radius)
+        if found is None or len(found.landmarks) < self._config.image_inliers:
+            found = self._register(frame, raw, T_map_prev, found) or found or self._relocalise(view)
+        return self._lose(view) if found is None else self._accept(raw, found, T_map_prev)
+
+    def _velocity(self, frame: Frame, T_prev_cur: Transform) -> FloatArray:
+        return velocity_of(T_prev_cur, self._prediction.seconds_since_last(frame.timestamp))
 
     def _view(self, frame: Frame, raw: Features, velocity: FloatArray) -> View:
         timed = at_color(raw, frame, velocity, self._readout.seconds, self._keypoints)
@@ -136,8 +143,12 @@ class FeatureMapOdometry:
             return self._T_reported
         return self._reference.T_map_cam @ self._T_ref_prev
 
-    def _locate(self, view: View, T_map_cam: Transform, wanted: IntArray, *radii: float) -> Located | None:
-        return locate(self._map, view, T_map_cam, wanted, radii, self._scale, self._config.min_inliers)
+    def _locate(
+        self, view: View, T_map_cam: Transform, wanted: IntArray, radius: float, least: int | None = None
+    ) -> Located | None:
+        least = self._config.min_inliers if least is None else least
+        found = locate(self._map, view, T_map_cam, wanted, radius, self._scale, least)
+        return None if found is None else replace(found, covariance=found.covariance * self._config.covariance_scale)
 
     def _locate_coarsely(self, view: View, guess: FloatArray) -> Located | None:
         """Where the frame is, from the prediction; failing that, from descriptors alone."""
@@ -150,31 +161,52 @@ class FeatureMapOdometry:
                 return found
         around = self._around(self._tracked)
         T_map_cam = match_and_solve(self._map, view, around, self._config.min_inliers, self._seed)
-        if T_map_cam is not None:
-            found = self._locate(view, T_map_cam, around, radius)
-            if found is not None:
-                return found
+        return None if T_map_cam is None else self._locate(view, T_map_cam, around, radius)
+
+    def _register(self, frame: Frame, raw: Features, T_map_prev: FloatArray, few: Located | None) -> Located | None:
+        """Where images put the frame that has few landmarks, or none; both together, each as far as it is certain."""
+        if not self._config.image_inliers:
+            return None
+        guesses = [] if few is None else [invert(T_map_prev) @ few.T_map_cam]
+        predicted = self._prediction.predict(frame.timestamp)
+        images = self._bridge.register(self._movers.standing(frame), predicted, guesses, self._readout.seconds)
+        if images is None:
+            return None
+        T_map_cam = T_map_prev @ images.T_ref_cam
+        view = self._view(frame, raw, self._velocity(frame, images.T_ref_cam))
+        around = self._around(self._tracked)
+        landmarks = self._locate(view, T_map_cam, around, self._config.narrow_radius, FEW)
+        return combine(view, T_map_cam, images.information, landmarks)
+
+    def _relocalise(self, view: View) -> Located | None:
+        """Where the frame is in any map."""
+        if self._reference is None or len(view.features) < self._config.min_inliers:
+            return None
         place = relocalise(self._map, view, self._config.min_inliers, self._seed)
         if place is None:
             return None
+        found = self._locate(view, place.T_map_cam, self._map.seen_from(place.keyframes), self._config.radius)
+        if found is None:
+            return None
         self._map_id = place.map_id
-        return self._locate(view, place.T_map_cam, self._map.seen_from(place.keyframes), radius)
+        return self._locate(view, found.T_map_cam, self._around(found.landmarks), self._config.narrow_radius)
 
     def _around(self, landmarks: IntArray) -> IntArray:
         """Identities of the landmarks observed by keyframes that share some with these."""
         keyframes = self._map.covisible(landmarks, self._map_id)[: self._config.local_keyframes]
         return self._map.seen_from(keyframes)
 
-    def _accept(self, view: View, raw: Features, found: Located, T_map_prev: Transform) -> Motion:
-        covariance = found.covariance * self._config.covariance_scale
+    def _accept(self, raw: Features, found: Located, T_map_prev: Transform) -> Motion:
+        view = found.view
+        covariance = found.covariance
         status = TrackingStatus.OK if len(found.landmarks) >= self._config.sure_inliers else TrackingStatus.DEGRADED
         if self._lost_since is not None:
             status = TrackingStatus.RELOCALISED
             covariance = covariance + wide_covariance(view.timestamp - self._lost_since)
-            self._reference = self._map.keyframes[self._map.covisible(found.landmarks, self._map_id)[0]]
-        else:
-            self._learn_readout(view, raw, found)
-        assert self._reference is not None
+            if len(found.landmarks):
+                self._reference = self._map.keyframes[self._map.covisible(found.landmarks, self._map_id)[0]]
+        elif len(found.landmarks) >= self._config.min_inliers:
+            self._learn_readout(raw, found)
         self._prediction.tracked(view.timestamp, invert(T_map_prev) @ found.T_map_cam)
         self._lost_since = self._usable_since = None
         features = view.features
@@ -183,36 +215,23 @@ class FeatureMapOdometry:
         seen = Observations(found.landmarks, features.pixels[rows], features.depths[rows], sigmas)
         T_prev_cur = invert(self._T_reported) @ found.T_map_cam
         self._T_reported = found.T_map_cam
-        self._T_ref_prev = invert(self._reference.T_map_cam) @ found.T_map_cam
-        self._tracked = found.landmarks
+        if self._reference is not None:
+            self._T_ref_prev = invert(self._reference.T_map_cam) @ found.T_map_cam
+        if len(found.landmarks) >= self._config.min_inliers:
+            self._tracked = found.landmarks
         self._map.landmarks.visible[found.in_view] += 1
         self._map.landmarks.found[found.landmarks] += 1
-        if self._is_keyframe_due(view, found):
+        if self._is_keyframe_due(found):
             self._insert(view, found.T_map_cam, found.landmarks, found.keypoints)
-        return Motion(T_prev_cur, covariance, status, self._map_id, len(found.landmarks), seen)
+        return Motion(T_prev_cur, covariance, status, self._map_id, len(found.landmarks), seen if len(rows) else None)
 
-    def _learn_readout(self, view: View, raw: Features, found: Located) -> None:
+    def _learn_readout(self, raw: Features, found: Located) -> None:
+        view = found.view
         points = transform_points(invert(found.T_map_cam), self._map.landmarks.positions[found.landmarks])
         measured = view.measured.take(found.keypoints)
         self._readout.learn(
             points, measured, raw.pixels[found.keypoints, 1], view.camera, view.velocity, self._readout.seconds
         )
-
-    def _cross(self, frame: Frame, view: View, T_map_prev: Transform) -> Motion:
-        """Where the frame does not match the map, use another kind of registration, if there is one and it succeeds."""
-        found = None
-        if self._lost_since is None and self._reference is not None:
-            found = self._bridge.register(self._movers.standing(frame), self._prediction.predict(frame.timestamp))
-        if found is None or self._reference is None:
-            return self._lose(view)
-        self._prediction.tracked(frame.timestamp, found.T_ref_cam)
-        T_map_cam = T_map_prev @ found.T_ref_cam
-        T_prev_cur = invert(self._T_reported) @ T_map_cam
-        self._T_reported = T_map_cam
-        self._T_ref_prev = invert(self._reference.T_map_cam) @ T_map_cam
-        if view.timestamp - self._keyframe_time >= self._config.restart_seconds:
-            self._start_map(view)  # continues the map with what is seen here
-        return Motion(T_prev_cur, found.covariance, TrackingStatus.DEGRADED, self._map_id, found.inliers)
 
     def _lose(self, view: View) -> Motion:
         """Predict; and where good images have not matched the map for a while, start a new one."""
@@ -234,12 +253,14 @@ class FeatureMapOdometry:
         if np.count_nonzero(view.features.depths) >= self._config.min_landmarks:
             self._insert(view, self._T_reported, NOTHING, NOTHING)
 
-    def _is_keyframe_due(self, view: View, found: Located) -> bool:
-        assert self._reference is not None
+    def _is_keyframe_due(self, found: Located) -> bool:
+        view = found.view
         elapsed = view.timestamp - self._keyframe_time
         depths = np.count_nonzero(view.features.depths)
         if elapsed < self._config.insert_min_interval or depths < self._config.min_landmarks:
             return False
+        if self._reference is None:
+            return True
         T_ref_cam = invert(self._reference.T_map_cam) @ found.T_map_cam
         return bool(
             elapsed >= self._config.insert_max_interval

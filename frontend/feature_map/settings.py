@@ -10,6 +10,9 @@ class FeatureMapConfig(Section):
     scale: float = setting(1.44, "scale factor between levels, instead of keypoints.scale", gt=1, le=4)
     min_inliers: int = setting(15, "inlier landmarks that a pose needs", gt=5)
     sure_inliers: int = setting(40, "inlier landmarks below which a pose is degraded", gt=5)
+    image_inliers: int = setting(
+        80, "inlier landmarks below which all pixels of the images are registered as well; 0 = never", ge=0
+    )
     min_landmarks: int = setting(50, "keypoints with depth that a map keyframe needs", gt=5)
     restart_seconds: float = setting(
         0.5, "time without tracking, on usable images, after which a new map starts", unit="s", ge=0

@@ -33,7 +33,6 @@ class DenseConfig(Section):
     keyframe_rotation: float = setting(
         0.15, "rotation after which dense_keyframe replaces its keyframe", unit="rad", ge=0
     )
-    max_bridge: float = setting(0.2, "maximum time between frames that auto registers densely", unit="s", gt=0)
     sigma: float = setting(0.6, "error of one pixel's depth that calibrates the covariance", unit="m", gt=0)
 
 

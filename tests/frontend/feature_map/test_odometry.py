@@ -10,10 +10,10 @@ import pytest
 from semslam.config import Config, DatasetConfig
 from semslam.datasets import Dataset, open_dataset
 from semslam.eval.trajectory import score_trajectory
-from semslam.frontend.auto import AutoOdometry
 from semslam.frontend.feature_map.odometry import FeatureMapOdometry
 from semslam.frontend.surface import make_cloud
-from semslam.geometry.se3 import compose
+from semslam.geometry.se3 import compose, invert, tangent
+from semslam.testing.scenes import room
 from semslam.types import Frame, Motion, TrackingStatus, Trajectory
 
 
@@ -101,18 +101,35 @@ def test_landmarks_keep_their_identity(kitchen: Dataset) -> None:
     assert len(np.intersect1d(seen[0].landmarks, seen[-1].landmarks)) > 50
 
 
-def test_auto_goes_on_where_there_are_no_corners(kitchen: Dataset) -> None:
-    def soft(frame: Frame) -> Frame:
-        v, u = np.mgrid[: frame.color.shape[0], : frame.color.shape[1]]
-        shade = (100 + 0.1 * u + 0.1 * v).astype(np.uint8)
-        return replace(frame, color=np.repeat(shade[..., None], 3, axis=2))
+def without_corners(frame: Frame) -> Frame:
+    v, u = np.mgrid[: frame.color.shape[0], : frame.color.shape[1]]
+    shade = (100 + 0.1 * u + 0.1 * v).astype(np.uint8)
+    return replace(frame, color=np.repeat(shade[..., None], 3, axis=2))
 
-    frames = [kitchen.frame(i) for i in range(4)] + [soft(kitchen.frame(i)) for i in range(4, 7)]
-    plain, auto = FeatureMapOdometry(Config()), AutoOdometry.from_config(Config())
-    without = [plain.track(frame).status for frame in frames]
-    with_dense = [auto.track(frame).status for frame in frames]
-    assert without[4] is TrackingStatus.LOST
-    assert TrackingStatus.DEGRADED in with_dense[4:]
+
+def test_depth_goes_on_where_there_are_no_corners() -> None:
+    clip = room()
+    frames = [*clip.frames[:4], *map(without_corners, clip.frames[4:12])]
+    motions = track(frames)
+    assert TrackingStatus.LOST not in {motion.status for motion in motions}
+    assert {motion.status for motion in motions[4:12]} == {TrackingStatus.DEGRADED}
+    assert {motion.map_id for motion in motions} == {0}
+    for before, motion in zip(range(len(frames) - 1), motions[1:], strict=True):
+        error = tangent(invert(invert(clip.poses[before]) @ clip.poses[before + 1]) @ motion.T_prev_cur)
+        assert np.linalg.norm(error[3:]) < 0.03
+        assert error @ np.linalg.solve(motion.covariance, error) / 6 < 10
+    never = FeatureMapOdometry(Config().with_changes(feature_map={"image_inliers": 0}))
+    assert TrackingStatus.LOST in {never.track(frame).status for frame in frames[:6]}
+
+
+def test_a_short_blackout_is_crossed() -> None:
+    frames = list(room().frames)
+    frames[6:8] = [black(frame) for frame in frames[6:8]]
+    motions = track([*frames[:6], frames[6], frames[7], *map(without_corners, frames[8:])])
+    statuses = [motion.status for motion in motions]
+    assert statuses[6:8] == [TrackingStatus.LOST] * 2
+    assert statuses[8] is TrackingStatus.RELOCALISED
+    assert {motion.map_id for motion in motions} == {0}
 
 
 def test_cloud_lies_on_the_surface_and_looks_at_the_camera(kitchen: Dataset) -> None:

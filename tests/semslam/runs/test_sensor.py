@@ -23,7 +23,6 @@ def test_only_an_unknown_camera_is_looked_at() -> None:
     assert not needs_timing(open_dataset("synthetic:room"), QUIET)
     assert not needs_timing(room(), QUIET.with_changes(feature_map={"readout": 0.0}))
     assert not needs_timing(room(), QUIET.with_changes(odometry="kiss"))
-    assert needs_timing(room(), QUIET.with_changes(odometry="auto"))
 
 
 def test_the_frames_get_what_was_found() -> None:

@@ -1,0 +1,87 @@
+"""A frame as direct registration takes it: small images of brightness and of inverse depth."""
+
+import math
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from semslam.geometry.se3 import Float32Array, FloatArray
+from semslam.types import Frame, Intrinsics, Points3
+
+WIDTHS = (80, 160)
+"""Pixels across the images of each level at most, coarsest first; the height is three quarters of it at most."""
+MAX_DEPTH = 6.0
+"""Metres; what is farther is too noisy to help."""
+EDGE = 0.1
+"""Share of the inverse depth by which neighbours differ across an edge, where nothing may be interpolated."""
+MIN_COVERAGE = 0.05
+"""Share of pixels that must have depth."""
+MIN_POINTS = 100
+"""Pixels of each level that must lie within a surface."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Level:
+    """Images of one size.
+
+    Attributes:
+        camera: of these images.
+        channels: (H, W, 3) brightness, inverse depth (1 / m), and whether they can be interpolated, 0 or 1.
+        slopes: (H, W, 4) derivatives by u and v of brightness, then of inverse depth.
+        points: (N, 3) metres, of the pixels that lie within a surface.
+        brightness: (N,) of the same pixels.
+    """
+
+    camera: Intrinsics
+    channels: Float32Array
+    slopes: Float32Array
+    points: Points3
+    brightness: FloatArray
+
+
+def make_levels(frame: Frame) -> tuple[Level, ...] | None:
+    """The images of a frame, coarsest first; None where it is tiny or has hardly any depth."""
+    camera = frame.intrinsics
+    color = camera.undistort_image(frame.color, cv2.INTER_LINEAR)
+    gray = np.asarray(cv2.cvtColor(color, cv2.COLOR_RGB2GRAY), dtype=np.float32)
+    depth = camera.undistort_image(frame.depth, cv2.INTER_NEAREST)
+    seen = (depth > 0) & (depth <= MAX_DEPTH)
+    if np.count_nonzero(seen) < MIN_COVERAGE * seen.size:
+        return None
+    inverse = np.where(seen, 1.0 / np.where(seen, depth, 1.0), 0.0).astype(np.float32)
+    levels = tuple(_level(gray, inverse, seen, camera, width) for width in WIDTHS)
+    return levels if min(len(level.points) for level in levels) >= MIN_POINTS else None
+
+
+def _level(
+    gray: Float32Array, inverse: Float32Array, seen: npt.NDArray[np.bool_], camera: Intrinsics, width: int
+) -> Level:
+    factor = 1.0 / math.ceil(max(camera.width / width, camera.height / (0.75 * width)))
+    small = camera.scaled(factor)
+    size = (small.width, small.height)
+    brightness = cv2.GaussianBlur(cv2.resize(gray, size, interpolation=cv2.INTER_AREA), (3, 3), 0)
+    share = cv2.resize(seen.astype(np.float32), size, interpolation=cv2.INTER_AREA)
+    mean = cv2.resize(inverse, size, interpolation=cv2.INTER_AREA) / np.maximum(share, 1e-6)
+    known = share > 0.5
+    # Neighbours without depth count as an edge: nothing is interpolated towards them.
+    shape = np.ones((3, 3), np.uint8)
+    highest = cv2.dilate(np.where(known, mean, np.inf).astype(np.float32), shape)
+    lowest = cv2.erode(np.where(known, mean, -np.inf).astype(np.float32), shape)
+    smooth = known & (highest - lowest < 2 * EDGE * mean)
+    filled = np.where(known, mean, 0).astype(np.float32)
+    weight = smooth.astype(np.float32)
+    soft = cv2.blur(filled * weight, (3, 3)) / np.maximum(cv2.blur(weight, (3, 3)), 1e-6)
+    surface = np.where(smooth, soft, filled).astype(np.float32)
+    slopes = [cv2.Scharr(image, cv2.CV_32F, *axis, scale=1 / 32) for image in (brightness, surface)
+              for axis in ((1, 0), (0, 1))]  # fmt: skip
+    # Means and slopes are one-sided beside an edge or the border, and would hold a wall along itself.
+    inner = smooth.astype(np.uint8)
+    inner[[0, -1], :] = inner[:, [0, -1]] = 0
+    inner = np.asarray(cv2.erode(inner, shape), dtype=np.uint8)
+    v, u = np.nonzero(inner)
+    z = 1.0 / surface[v, u].astype(np.float64)
+    points = np.column_stack([(u - small.cx) / small.fx * z, (v - small.cy) / small.fy * z, z])
+    channels = np.dstack([brightness, surface, inner.astype(np.float32)])
+    return Level(small, channels, np.dstack(slopes), points, brightness[v, u].astype(np.float64))
