@@ -9,6 +9,7 @@ from semslam.backend.incremental import IncrementalPoseGraph
 from semslam.config import Config
 from semslam.frontend.keyframes import DetailExtractor
 from semslam.loop.detector import NoLoops
+from semslam.loop.memory import without_descriptors
 from semslam.loop.search import LoopSearch
 from semslam.loop.verification.verifier import LoopVerifier, build_verifier
 from semslam.runtime.libraries import load_registration_ahead
@@ -65,6 +66,16 @@ class KeyframeAnswer:
     labels: LabelMap | None
     calls: tuple[Calls, ...]
     usage: ProcessUsage
+
+    def complete(self, keyframe: Keyframe, has_landmarks: bool) -> Keyframe:
+        """The keyframe with its details, or without descriptors where nothing will match it again.
+
+        Args:
+            keyframe: as it was made.
+            has_landmarks: whether the last adjustment has landmarks of it; else it matches keypoints.
+        """
+        keyframe = replace(keyframe, details=self.details)
+        return keyframe if self.kept or not has_landmarks else without_descriptors(keyframe)
 
 
 class LoopClosing:

@@ -1,7 +1,7 @@
 """The algorithm: a frame in, a state out. It reads no files, writes none and prints nothing."""
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Self
 
 import numpy as np
@@ -13,19 +13,18 @@ from semslam.config import Config
 from semslam.errors import GraphError
 from semslam.frontend.keyframes import KeyframeBuilder
 from semslam.frontend.odometry import Odometry, Preparing
-from semslam.geometry.se3 import adjoint, invert, orthonormalise
-from semslam.loop.memory import without_descriptors
+from semslam.geometry.se3 import invert, orthonormalise
 from semslam.loop.verification.verifier import LoopVerifier
 from semslam.plugins import load
 from semslam.runtime.stopwatch import Stopwatch
 from semslam.runtime.workers import Worker, WorkerKind
+from semslam.system.anchor import Anchor
 from semslam.system.closing import KeyframeAnswer, KeyframeJob, build_closing
 from semslam.system.keyframe_queue import make_queue
 from semslam.system.recovery import recover_poses
 from semslam.system.refinement import refine
 from semslam.system.result import FrameState, SlamResult
 from semslam.types import (
-    Covariance6,
     FloatArray,
     Frame,
     Keyframe,
@@ -35,18 +34,6 @@ from semslam.types import (
     Transform,
     Verification,
 )
-
-
-@dataclass(slots=True)
-class _Anchor:
-    """The last keyframe of a map, and the uncertainty (6, 6) of the motion since, in the current camera's tangent."""
-
-    keyframe: Keyframe
-    covariance: Covariance6
-
-    def extend(self, motion: Motion) -> None:
-        Ad = adjoint(invert(motion.T_prev_cur))
-        self.covariance = Ad @ self.covariance @ Ad.T + motion.covariance
 
 
 class Slam:
@@ -85,7 +72,7 @@ class Slam:
         self._config = config
         self._stopwatch = stopwatch
         self._listener = listener
-        self._anchors: dict[int, _Anchor] = {}
+        self._anchors: dict[int, Anchor] = {}
         self._frames: list[FrameState] = []
         self._keyframes: list[Keyframe] = []
         self._outcomes: list[Verification] = []
@@ -256,7 +243,7 @@ class Slam:
         """Join a keyframe to the one before in its map."""
         self._graph.add_keyframe(keyframe.id, keyframe.T_odom_cam)
         last = self._anchors.get(keyframe.map_id)
-        self._anchors[keyframe.map_id] = _Anchor(keyframe, np.zeros((6, 6)))
+        self._anchors[keyframe.map_id] = Anchor(keyframe, np.zeros((6, 6)))
         if last is None:
             return None
         T_last_this = invert(last.keyframe.T_odom_cam) @ keyframe.T_odom_cam
@@ -274,9 +261,7 @@ class Slam:
         for answer in answers:
             self._listener(answer)
             self._stopwatch.add(answer.calls)
-            keyframe = replace(self._keyframes[answer.keyframe], details=answer.details)
-            if not answer.kept and keyframe.id in self._observations:  # else the last adjustment matches it
-                keyframe = without_descriptors(keyframe)
+            keyframe = answer.complete(self._keyframes[answer.keyframe], answer.keyframe in self._observations)
             self._keyframes[keyframe.id] = keyframe
             self._outcomes += answer.verifications
             for verification in answer.verifications:
