@@ -32,6 +32,7 @@ ODOMETRIES: dict[str, str] = {
     "dense": "semslam.frontend.frame_to_frame.dense:DenseOdometry",
     "dense_keyframe": "semslam.frontend.frame_to_frame.dense_keyframe:DenseKeyframeOdometry",
     "kiss": "semslam.frontend.kiss:KissOdometry",
+    "auto": "semslam.frontend.auto:AutoOdometry",
 }
 DETECTORS: dict[str, str] = {
     "none": "semslam.loop.detector:NoLoops",
