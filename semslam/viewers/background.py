@@ -1,7 +1,8 @@
 """A viewer beside the run, which does not wait for what it shows."""
 
+import os
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from functools import partial
 from operator import methodcaller
@@ -13,15 +14,19 @@ from semslam.runtime.workers import Worker, WorkerKind, answer_of, make_worker
 from semslam.system.result import FrameState
 from semslam.viewers.viewer import CameraImage, FinishedRun, KeyframeScene, LoopScene, Viewer
 
-WAITING = 64
-"""Calls that wait for the viewer at the most; a run that is further ahead waits."""
-IMAGE_INTERVAL = 0.09
-"""Seconds between two images that are passed on: ten a second; compressing them is most of a viewer's work."""
+WAITING = 32
+"""Images that wait for the viewer at the most; a run that is further ahead waits."""
+IMAGE_INTERVAL = 0.19
+"""Seconds between two images that are passed on, five a second; compressing them is most of a viewer's work."""
+NICENESS = 10
+"""By how much a viewer's process steps back where the run needs all cores."""
 _Call = Callable[[Viewer], object]
 
 
 class BackgroundViewer:
-    """Passes what it is shown to another viewer, in order; of the images ten a second and those of keyframes.
+    """Passes what it is shown to another viewer, in order; of the images five a second and those of keyframes.
+
+    What comes between two images is passed on with the second, since each message costs both sides.
 
     A viewer that fails is left alone from then on: it costs the run nothing but its pictures.
 
@@ -34,8 +39,9 @@ class BackgroundViewer:
     def __init__(
         self, open_viewer: Callable[[], Viewer], report: Callable[[str], None], kind: WorkerKind = WorkerKind.PROCESS
     ) -> None:
-        self._worker: Worker[_Call, None] = make_worker(kind, partial(_prepare, open_viewer))
+        self._worker: Worker[Sequence[_Call], None] = make_worker(kind, partial(_prepare, open_viewer, kind))
         self._report = report
+        self._collected: list[_Call] = []
         self._waiting: deque[Future[None]] = deque()
         self._next_image = -np.inf
         self._ended = False
@@ -46,6 +52,7 @@ class BackgroundViewer:
             image = None
         if image is not None:
             self._next_image = state.timestamp + IMAGE_INTERVAL
+            self._pass_on()
         self._show(methodcaller("track", image, state))
 
     def keyframe(self, scene: KeyframeScene) -> None:
@@ -73,13 +80,19 @@ class BackgroundViewer:
         """Show no more after what is still waiting."""
         if not self._ended:
             self._show(methodcaller("close"))
+            self._pass_on()
             self._ended = True
             self._worker.begin_close()
 
     def _show(self, call: _Call) -> None:
-        if self._ended:
+        if not self._ended:
+            self._collected.append(call)
+
+    def _pass_on(self) -> None:
+        calls, self._collected = self._collected, []
+        if self._ended or not calls:
             return
-        self._waiting.append(self._worker.submit(call))
+        self._waiting.append(self._worker.submit(calls))
         while self._waiting and (self._waiting[0].done() or len(self._waiting) > WAITING):
             self._check(self._waiting.popleft())
 
@@ -93,15 +106,18 @@ class BackgroundViewer:
             self._ended = True
 
 
-def _prepare(open_viewer: Callable[[], Viewer]) -> Callable[[_Call], None]:
+def _prepare(open_viewer: Callable[[], Viewer], kind: WorkerKind) -> Callable[[Sequence[_Call]], None]:
+    if kind is WorkerKind.PROCESS and hasattr(os, "nice"):
+        os.nice(NICENESS)
     viewer = open_viewer()
     has_failed = False
 
-    def show(call: _Call) -> None:
+    def show(calls: Sequence[_Call]) -> None:
         nonlocal has_failed
         if not has_failed:
             has_failed = True
-            call(viewer)
+            for call in calls:
+                call(viewer)
             has_failed = False
 
     return show

@@ -29,6 +29,7 @@ from semslam.cli import main
 from tests.conftest import WallDataset
 
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a test run in the background of a shell ignores it
+signal.signal(signal.SIGHUP, signal.SIG_DFL)  # and one under nohup this
 number, moment, out = int(sys.argv[1]), sys.argv[2], sys.argv[3]
 
 def twice():

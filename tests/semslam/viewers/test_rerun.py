@@ -50,7 +50,8 @@ def test_a_run_is_recorded_frame_by_frame(semslam: Call, tmp_path: Path) -> None
     assert outcome.code == 0, outcome.err
     rows = _rows(tmp_path / "run.rrd")
     keyframes = len((tmp_path / "run" / "keyframes.csv").read_text().splitlines()) - 1
-    assert rows["/world/live/camera"] == rows["/world/live/camera/image/color"] == rows["/tracking/inliers"] == 30
+    assert rows["/world/live/camera"] == rows["/tracking/inliers"] == 30
+    assert 15 <= rows["/world/live/camera/image/color"] < 30, "ten frames a second, five images and the keyframes'"
     assert keyframes - 1 <= rows["/world/live/path"] == rows["/world/live/odometry"] <= keyframes + 1
     for name in ("camera/image/depth", "camera/image/labels", "camera/image/nodes", "nodes", "cloud", "landmarks"):
         # The first keyframe has no landmarks yet.
