@@ -30,12 +30,17 @@ Pair = tuple[int, int]
 class RunningEstimate:
     """Current poses of keyframes; what is placed, held and joined counts from the next ``update``.
 
+    Args:
+        exact: whether to factorise by QR, which solves badly conditioned graphs that Cholesky cannot, and takes half
+            as long again where a loop comes.
+
     Attributes:
         loops: the loops that shape the poses, with iSAM2's index of each one's factor.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, exact: bool = False) -> None:
         params = gtsam.ISAM2Params()
+        params.setFactorization("QR" if exact else "CHOLESKY")
         params.setRelinearizeThreshold(RELINEARIZE)
         params.relinearizeSkip = NEVER  # but where it is asked for
         self.loops: dict[Pair, int] = {}
@@ -133,15 +138,16 @@ class RunningEstimate:
         return moved
 
 
-def estimate_of(solution: GraphSolution, order: Sequence[int]) -> Steps[RunningEstimate]:
+def estimate_of(solution: GraphSolution, order: Sequence[int], exact: bool = False) -> Steps[RunningEstimate]:
     """A new estimate that starts as a solution, a chunk of keyframes at each step.
 
     Args:
         solution: poses and loops to start from.
         order: its keys, as they came.
+        exact: see ``RunningEstimate``.
     """
     place = {key: index for index, key in enumerate(order)}
-    estimate = RunningEstimate()
+    estimate = RunningEstimate(exact)
     steps: list[list[tuple[Edge, Pair | None]]] = [[] for _ in range(-(-len(order) // CHUNK))]
     widened = solution.widened
     count = len(solution.odometry)

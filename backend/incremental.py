@@ -74,7 +74,7 @@ class IncrementalPoseGraph:
         self._odometry_scale = self._loop_scale = 1.0
         self._retry_at, self._due = FIRST_RETRY, False
         self._judgement: Steps[None] | None = None
-        self._paused = False
+        self._paused = self._exact = False
 
     @property
     def loops(self) -> tuple[LoopConstraint, ...]:
@@ -159,9 +159,17 @@ class IncrementalPoseGraph:
         before = tuple(self._estimate.loops)
         try:
             self._take_in()
-        except RuntimeError as error:  # GTSAM's own, such as an indeterminate system
-            raise GraphError(f"The pose graph could not be updated: {' '.join(str(error).split())}") from error
+        except RuntimeError:  # GTSAM's own, such as an indeterminate system
+            self._begin_exactly()
         return self._changed(before)
+
+    def _begin_exactly(self) -> None:
+        """Go on from the batch solution, with an estimate that badly conditioned graphs cannot stop."""
+        self._exact = True
+        try:
+            self._restart(self._graph.optimize())
+        except RuntimeError as error:
+            raise GraphError(f"The pose graph could not be updated: {' '.join(str(error).split())}") from error
 
     def optimize(self) -> GraphSolution:
         """Optimise the whole graph robustly, and go on from there with the loops that were accepted.
@@ -170,12 +178,15 @@ class IncrementalPoseGraph:
             GraphError: the graph is empty or the optimiser failed.
         """
         solution, before = self._graph.optimize(), tuple(self._estimate.loops)
+        self._restart(solution)
+        self._changed(before)
+        return solution
+
+    def _restart(self, solution: GraphSolution) -> None:
         self._judgement, self._due = None, False
         self._fresh.clear()
         self._keys_done, self._trusted_done = len(self._keys), len(self._trusted)
         finish(self._start_anew(solution, len(self._keys), len(self._trusted)))
-        self._changed(before)
-        return solution
 
     def pose(self, key: int) -> FloatArray:
         """The current pose T_world_cam (4, 4) of one keyframe, which an ``update`` has taken in."""
@@ -268,7 +279,7 @@ class IncrementalPoseGraph:
             keys: keyframes that were in it.
             edges: trusted edges that were in it.
         """
-        estimate = yield from estimate_of(solution, self._keys[:keys])
+        estimate = yield from estimate_of(solution, self._keys[:keys], self._exact)
         self._extend(estimate, self._keys[keys:], self._trusted[edges:], solution.odometry_scale)
         judged = {_pair(verdict.constraint): verdict for verdict in solution.verdicts}
         loops = {_pair(constraint): constraint for constraint in self._graph.loops}

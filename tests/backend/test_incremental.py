@@ -68,6 +68,23 @@ def test_a_clean_graph_agrees_with_batch_within_millimetres(seed):
     assert apart(graph.poses(), batch(odometry, kept, BackendConfig(robust="none", max_odometry_scale=1)).poses) < 2e-3
 
 
+def test_a_system_that_cannot_be_factorised_is_solved_in_batch_and_gone_on_with(monkeypatch):
+    truth, odometry, loops = simulated()
+    update, calls = estimate.RunningEstimate.update, []
+
+    def indeterminate_once(self):
+        calls.append(1)
+        if len(calls) == 60:
+            raise RuntimeError("Indeterminate linear system")
+        update(self)
+
+    monkeypatch.setattr(estimate.RunningEstimate, "update", indeterminate_once)
+    graph = replay(odometry, loops)
+    assert len(calls) > 80
+    assert len(graph.accepted) == len(loops)
+    assert apart(graph.poses(), batch(odometry, loops).poses) < 0.003
+
+
 def test_a_loop_shows_at_once():
     truth, odometry, loops = simulated(seed=1)
     errors = {}
