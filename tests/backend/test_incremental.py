@@ -69,7 +69,7 @@ def test_a_clean_graph_agrees_with_batch_within_millimetres(seed):
 
 
 def test_a_system_that_cannot_be_factorised_is_solved_in_batch_and_gone_on_with(monkeypatch):
-    truth, odometry, loops = simulated()
+    _, odometry, loops = simulated()
     update, calls = estimate.RunningEstimate.update, []
 
     def indeterminate_once(self):
