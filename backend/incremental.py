@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from semslam.backend.estimate import Pair, RunningEstimate, estimate_of
 from semslam.backend.graph.factors import ANCHOR_SIGMA
-from semslam.backend.graph.products import Edge, GraphSolution, loop_edge
+from semslam.backend.graph.products import Edge, GraphSolution, LoopChange, loop_edge
 from semslam.backend.pose_graph import PoseGraph
 from semslam.backend.steps import Steps, finish
 from semslam.config import BackendConfig
@@ -20,19 +20,6 @@ FIRST_RETRY, RETRY_SHARE = 5, 0.05
 """Waiting loops, and share of all loops, at which all are judged together; then again when they have doubled."""
 BUDGET = 4_000
 """Keyframes times steps of a judgement that one update may cost, and the same times loops that it may try."""
-
-
-@dataclass(frozen=True, slots=True)
-class LoopChange:
-    """What an update made of loops.
-
-    Attributes:
-        accepted: loops that shape the poses now and did not before.
-        withdrawn: loops that shaped the poses before and no longer do.
-    """
-
-    accepted: tuple[Pair, ...]
-    withdrawn: tuple[Pair, ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

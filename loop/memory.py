@@ -34,18 +34,18 @@ class LoopMemory:
 
 def without_content(keyframe: Keyframe) -> Keyframe:
     """A keyframe without keypoints and points."""
-    features, cloud = keyframe.features, keyframe.cloud
-    no_features = Features(*(getattr(features, field.name)[:0].copy() for field in fields(Features)))
-    no_cloud = Cloud(cloud.points[:0].copy(), cloud.normals[:0].copy())
-    return replace(keyframe, features=no_features, cloud=no_cloud, details=None)
+    no_features = Features(*(getattr(keyframe.features, field.name)[:0].copy() for field in fields(Features)))
+    return replace(keyframe, features=no_features, cloud=_emptied(keyframe.cloud), details=None)
 
 
 def without_descriptors(keyframe: Keyframe) -> Keyframe:
     """A keyframe that can be matched no more and adds no points to a map; where its keypoints lie is still known."""
-    cloud = keyframe.cloud
     details = None if keyframe.details is None else _places_alone(keyframe.details)
-    no_cloud = Cloud(cloud.points[:0].copy(), cloud.normals[:0].copy())
-    return replace(keyframe, features=_places_alone(keyframe.features), cloud=no_cloud, details=details)
+    return replace(keyframe, features=_places_alone(keyframe.features), cloud=_emptied(keyframe.cloud), details=details)
+
+
+def _emptied(cloud: Cloud) -> Cloud:
+    return Cloud(cloud.points[:0].copy(), cloud.normals[:0].copy())
 
 
 def _places_alone(features: Features) -> Features:

@@ -129,3 +129,16 @@ def loop_edge(constraint: LoopConstraint) -> Edge:
     what = f"The loop from {match} to {query}"
     T = checked_pose(constraint.T_match_query, what)
     return Edge(match, query, T, checked_covariance(constraint.covariance, what))
+
+
+@dataclass(frozen=True, slots=True)
+class LoopChange:
+    """What an update made of loops.
+
+    Attributes:
+        accepted: match and query of loops that shape the poses now and did not before.
+        withdrawn: the same of loops that shaped the poses before and no longer do.
+    """
+
+    accepted: tuple[tuple[int, int], ...]
+    withdrawn: tuple[tuple[int, int], ...]

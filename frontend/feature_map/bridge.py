@@ -19,6 +19,8 @@ BENT = 0.4
 """Share of the motion during a read-out: images are registered as if all rows were of one instant."""
 MIN_CONTRAST = 4.0
 """Standard deviation of the grey levels of a usable image: a black or a white one is a fault of the camera."""
+SHORTEST = 1e-3
+"""Seconds between two frames, at the least: stamps may be given twice."""
 MAX_GAP = 0.5
 """Seconds from the last tracked frame after which too little of it is in view."""
 
@@ -37,7 +39,7 @@ class Bridge:
     def tracked(self, frame: Frame, covariance: Covariance6) -> None:
         """Note a frame that was tracked, with the covariance (6, 6) of its motion since the frame before."""
         if self._frame is not None and not self._is_lost:
-            self._velocity_covariance = covariance / max(frame.timestamp - self._frame.timestamp, 1e-3) ** 2
+            self._velocity_covariance = covariance / max(frame.timestamp - self._frame.timestamp, SHORTEST) ** 2
         self._frame = frame
         self._T_tracked_prev = np.eye(4)
         self._is_lost = False
@@ -64,14 +66,15 @@ class Bridge:
         reference, current = self._levels_for(tracked), make_levels(frame)
         if reference is None or current is None:
             return None
+        seconds = max(frame.timestamp - tracked.timestamp, SHORTEST)
         T_tracked_prev = self._T_tracked_prev
-        information = _inverse(self._expected(frame.timestamp - tracked.timestamp))
+        information = _inverse(self._expected(seconds))
         starts = [T_tracked_prev @ guess for guess in (*guesses, T_prev_cur)]
         found = register(reference, current, starts, Belief(starts[-1], information))
         self._levels, self._levels_of = current, frame
         if found is None:
             return None
-        share = INEXACT + BENT * readout / (frame.timestamp - tracked.timestamp)
+        share = INEXACT + BENT * readout / seconds
         unmodelled = np.diag((share * tangent(found.T_ref_cam)) ** 2)
         information = _inverse(_inverse(found.information) + unmodelled)
         return Registered(invert(T_tracked_prev) @ found.T_ref_cam, information)

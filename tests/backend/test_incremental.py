@@ -12,8 +12,8 @@ from semslam.backend.analysis.judge import constraint_of, judge_graph, split_edg
 from semslam.backend.analysis.simulation import measure, measure_odometry, ring
 from semslam.backend.analysis.stress import FalseLoopKind, false_loops
 from semslam.backend.graph.g2o import read_g2o
-from semslam.backend.graph.products import PosedGraph
-from semslam.backend.incremental import IncrementalPoseGraph, LoopChange
+from semslam.backend.graph.products import LoopChange, PosedGraph
+from semslam.backend.incremental import IncrementalPoseGraph
 from semslam.backend.pose_graph import PoseGraph
 from semslam.config import BackendConfig
 from semslam.errors import GraphError

@@ -122,6 +122,14 @@ def test_depth_goes_on_where_there_are_no_corners() -> None:
     assert TrackingStatus.LOST in {never.track(frame).status for frame in frames[:6]}
 
 
+def test_stamps_that_are_given_twice_end_nothing_where_images_are_registered() -> None:
+    frames = list(open_dataset("synthetic:room?frames=5"))
+    twice = [replace(frame, timestamp=frames[index - index % 2].timestamp) for index, frame in enumerate(frames)]
+    odometry = FeatureMapOdometry.from_config(Config(feature_map={"image_inliers": 10_000}))
+    motions = [odometry.track(frame) for frame in twice]
+    assert all(np.isfinite(motion.T_prev_cur).all() and np.isfinite(motion.covariance).all() for motion in motions)
+
+
 def test_a_short_blackout_is_crossed() -> None:
     frames = list(room().frames)
     frames[6:8] = [black(frame) for frame in frames[6:8]]
