@@ -3,6 +3,7 @@
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import groupby
 
 LINK = re.compile(r"(?P<code>`+[^`]+`+)|(?P<text>!?\[(?:[^\[\]]|\[[^\]]*\])*\])\((?P<target>[^()\s]+)\)")
 """A link, or a piece of inline code before it, in which nothing is a link."""
@@ -47,9 +48,9 @@ def links(text: str) -> list[Link]:
     """All links of a page; code is passed over."""
     return [
         Link(found["text"], found["target"])
-        for line, is_code in _lines(text)
+        for block, is_code in _blocks(text)
         if not is_code
-        for found in LINK.finditer(line)
+        for found in LINK.finditer(block)
         if found["target"]
     ]
 
@@ -66,7 +67,16 @@ def rewritten(text: str, change: Callable[[Link], str]) -> str:
     def replace(found: re.Match[str]) -> str:
         return found["code"] or change(Link(found["text"], found["target"]))
 
-    return "\n".join(line if is_code else LINK.sub(replace, line) for line, is_code in _lines(text))
+    return "\n".join(block if is_code else LINK.sub(replace, block) for block, is_code in _blocks(text))
+
+
+def _blocks(text: str) -> Iterator[tuple[str, bool]]:
+    """Lines up to an empty one together, since a link may begin on one and end on the next; code line by line."""
+    for together, lines in groupby(_lines(text), lambda line: bool(line[0].strip()) and not line[1]):
+        if together:
+            yield "\n".join(line for line, _ in lines), False
+        else:
+            yield from lines
 
 
 def _lines(text: str) -> Iterator[tuple[str, bool]]:

@@ -36,3 +36,9 @@ def test_rewrites_links_and_nothing_else() -> None:
 
 def test_forms_anchors_as_the_hosts_do() -> None:
     assert anchors(PAGE) == {"a-page-code-and-more-2"}
+
+
+def test_a_link_may_begin_on_one_line_and_end_on_the_next() -> None:
+    page = "See [what\nit is](a.md).\n\nA [ bracket.\n\nAnother ](b.md).\n"
+    assert [link.target for link in links(page)] == ["a.md"]
+    assert rewritten(page, lambda link: f"<{link.target}>") == page.replace("[what\nit is](a.md)", "<a.md>")
