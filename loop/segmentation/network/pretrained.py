@@ -9,7 +9,8 @@ from torch import Tensor, nn
 from semslam.errors import ModelError
 from semslam.loop.segmentation.classes import NYU40_NAMES
 from semslam.loop.segmentation.network.checkpoint import read_tensors
-from semslam.loop.segmentation.network.network import ConvNorm, DeepLab
+from semslam.loop.segmentation.network.encoder import ConvNorm
+from semslam.loop.segmentation.network.network import DeepLab
 
 ADE_ROW: dict[str, int] = {
     "wall": 1, "floor": 4, "ceiling": 6, "bed": 8, "window": 9, "cabinet": 11, "person": 13, "door": 15, "table": 16,

@@ -6,7 +6,8 @@ Chen et al., ECCV 2018, Figure 4. There are no weights for it.
 import torch.nn.functional as F  # noqa: N812
 from torch import Tensor, nn
 
-from semslam.loop.segmentation.network.network import ConvNorm, DeepLab, Encoder, Encoding
+from semslam.loop.segmentation.network.encoder import ConvNorm, Encoder, Encoding
+from semslam.loop.segmentation.network.network import DeepLab
 
 MIDDLE_BLOCKS = 16
 

@@ -7,9 +7,9 @@ import torch.nn.functional as F  # noqa: N812
 
 from semslam.errors import ModelError
 from semslam.loop.segmentation.network.checkpoint import load_network, save_weights
+from semslam.loop.segmentation.network.encoder import ConvNorm
 from semslam.loop.segmentation.network.fast_layers import dilated_depthwise, enlarge
 from semslam.loop.segmentation.network.network import (
-    ConvNorm,
     build_mobilenet_deeplab,
     count_multiply_adds,
     count_parameters,
