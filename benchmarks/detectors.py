@@ -152,7 +152,7 @@ def changed_views(views: list[KeyframeView], config: Config) -> Iterator[tuple[i
             changed = change_frame(frame, change, row)
             if change is Change.NONE or changed is not frame:
                 keyframe = replace(builder.build_at(changed, old.keyframe.T_odom_cam), id=len(views))
-                labels = segmenter.segment(changed.color)
+                labels = segmenter.segment(changed.color, changed.depth)
                 yield row, change, KeyframeView(keyframe, changed.color, changed.depth, labels)
 
 

@@ -86,7 +86,8 @@ def main() -> None:
     shots: list[tuple[str, Transform]] = []
     for shot in everything(args.sequences, args.every, args.photos, config):
         keyframe = builder.build_at(shot.frame, shot.T_world_cam, shot.map_id)
-        view = KeyframeView(keyframe, shot.frame.color, shot.frame.depth, segmenter.segment(shot.frame.color, 0))
+        labels = segmenter.segment(shot.frame.color, shot.frame.depth)
+        view = KeyframeView(keyframe, shot.frame.color, shot.frame.depth, labels)
         keyframes.append(keyframe)
         shots.append((shot.place, shot.T_world_cam))
         for name, detector in detectors.items():

@@ -42,7 +42,7 @@ from semslam.maps.semantic.semantic_map import SemanticMap, build_semantic_map
 from semslam.maps.views import PosedView, sample
 from semslam.runs.differences import find_changes
 from semslam.runs.saved_views import SavedViews, open_saved
-from semslam.types import Cloud, FloatArray, IntArray, LabelMap, Points3, Transform, UInt8Array
+from semslam.types import Cloud, Float32Array, FloatArray, IntArray, LabelMap, Points3, Transform, UInt8Array
 
 MARGIN = 0.15
 NEAR, FAR = 0.3, 1.0
@@ -57,9 +57,9 @@ class Remembered:
         self.name, self.names, self.fingerprint = "remembered", self._segmenter.names, ""
         self.kept: dict[int, UInt8Array] = {}
 
-    def segment(self, color: UInt8Array, frame_index: int | None = None) -> LabelMap:
+    def segment(self, color: UInt8Array, depth: Float32Array | None = None, frame_index: int | None = None) -> LabelMap:
         """Ask, and keep the labels."""
-        answer = self._segmenter.segment(color, frame_index)
+        answer = self._segmenter.segment(color, depth, frame_index)
         self.kept[frame_index or 0] = answer.labels
         return answer
 
@@ -72,7 +72,7 @@ class TrueLabels:
         self._dataset = dataset
         self.kept: dict[int, UInt8Array] = {}
 
-    def segment(self, color: UInt8Array, frame_index: int | None = None) -> LabelMap:
+    def segment(self, color: UInt8Array, depth: Float32Array | None = None, frame_index: int | None = None) -> LabelMap:
         """Render the labels of a frame, or give those rendered before."""
         index = frame_index or 0
         if index not in self.kept:

@@ -118,7 +118,7 @@ def steady_table(sequence: Path, gap: int, stride: int, segmenters: dict[str, Se
         rows = []
         for i in range(0, len(dataset) - gap, stride):
             pair = dataset.frame(i), dataset.frame(i + gap)
-            first, second = (segmenter.segment(frame.color, frame.source_index) for frame in pair)
+            first, second = (segmenter.segment(frame.color, frame.depth, frame.source_index) for frame in pair)
             motion = true_motion(dataset, *pair)
             if motion is not None:
                 rows.append((*agreement(pair[0], pair[1], first, second, motion), set_overlap(first, second)))

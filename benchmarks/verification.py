@@ -59,7 +59,7 @@ def keyframes(path: str, every: int, config: Config, first: int, start: float) -
     for number, index in enumerate(range(0, len(dataset), every)):
         frame = dataset.frame(index)
         keyframe = builder.build_at(frame, invert(poses[0]) @ poses[number])  # detectors turn images upright by it
-        labels = segmenter.segment(frame.color, frame.source_index)
+        labels = segmenter.segment(frame.color, frame.depth, frame.source_index)
         later = replace(keyframe, id=first + number, timestamp=keyframe.timestamp + start)
         yield KeyframeView(later, frame.color, frame.depth, labels)
 

@@ -202,7 +202,7 @@ class LoopSearch:
     def _view(self, keyframe: Keyframe, frame: Frame, labels: LabelMap | None) -> KeyframeView:
         if labels is None and self._segmenter is not None:
             with self._stopwatch.stage("segmentation"):
-                labels = self._segmenter.segment(frame.color, frame.source_index)
+                labels = self._segmenter.segment(frame.color, frame.depth, frame.source_index)
         return KeyframeView(keyframe, frame.color, frame.depth, labels)
 
     def _verify(self, candidate: LoopCandidate) -> Verification:

@@ -2,11 +2,8 @@
 
 from typing import Protocol, Self, runtime_checkable
 
-import numpy as np
-import numpy.typing as npt
-
 from semslam.config import Config
-from semslam.types import LabelMap
+from semslam.types import Float32Array, LabelMap, UInt8Array
 
 
 @runtime_checkable
@@ -32,10 +29,12 @@ class Segmenter(Protocol):
     def fingerprint(self) -> str:
         """Text that changes with the weights and every setting that labels depend on; empty = never cache."""
 
-    def segment(self, color: npt.NDArray[np.uint8], frame_index: int | None = None) -> LabelMap:
+    def segment(self, color: UInt8Array, depth: Float32Array | None = None, frame_index: int | None = None) -> LabelMap:
         """Label an RGB image (H, W, 3) uint8; labels come back at its full size.
 
         Args:
             color: the image.
+            depth: (H, W) float32, 0 = unknown, aligned with the image, in metres or any other unit; a segmenter may
+                use it or leave it.
             frame_index: the frame's ``source_index``, for segmenters that look labels up.
         """

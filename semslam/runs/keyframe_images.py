@@ -44,7 +44,7 @@ def _segmenter(config: Config) -> Segmenter | None:
 def _keyframe_image(frame: Frame, segmenter: Segmenter | None) -> KeyframeImage:
     if segmenter is None:
         return KeyframeImage(frame.color)
-    labels = segmenter.segment(frame.color, frame.index)
+    labels = segmenter.segment(frame.color, frame.depth, frame.source_index)
     step = max(frame.color.shape[1] // MASK_WIDTH, 1)
     small = replace(labels, labels=labels.labels[::step, ::step], confidence=None)
     mask = colorize(small)

@@ -48,7 +48,7 @@ def play(saved: SavedViews, viewer: Viewer, progress: Progress = silent) -> None
             image = CameraImage(frame.color, frame.intrinsics)
             viewer.track(image, _state(recorded, builder.pose.T_odom_cam, live, keyframe.id))
             viewer.keyframe(KeyframeScene.of(keyframe, frame, recorded.motion.observations))
-            labels = segmenter.segment(frame.color, frame.source_index)
+            labels = segmenter.segment(frame.color, frame.depth, frame.source_index)
             viewer.loops(LoopScene.of(keyframe, labels, loops[keyframe.id]))
             keyframes.append(keyframe)
         else:

@@ -109,7 +109,7 @@ def keyframe_views(
             continue
         if builder.advance(index, frame.timestamp, odometry.track(frame)):
             keyframe = builder.build(frame)
-            labels = None if segmenter is None else segmenter.segment(frame.color, frame.source_index)
+            labels = None if segmenter is None else segmenter.segment(frame.color, frame.depth, frame.source_index)
             yield KeyframeView(keyframe, frame.color, frame.depth, labels)
 
 

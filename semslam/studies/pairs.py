@@ -168,7 +168,7 @@ def _scores(
     def make(identity: int, frame: Frame, T_world_cam: Transform) -> KeyframeView:
         report(title, identity, 2 * len(pairs))
         keyframe = builder.build_at(frame, T_world_cam)
-        labels = None if segmenter is None else segmenter.segment(frame.color, frame.source_index)
+        labels = None if segmenter is None else segmenter.segment(frame.color, frame.depth, frame.source_index)
         return KeyframeView(keyframe, frame.color, frame.depth, labels)
 
     return score_pairs(detectors, pairs, make)

@@ -41,7 +41,7 @@ class SegmenterContract:
     def test_labels_have_the_size_of_the_image(self, shape: tuple[int, int]) -> None:
         """Labels and confidences of every pixel, within the classes and within 0..1."""
         segmenter = self.make()
-        found = segmenter.segment(_image(*shape), 0)
+        found = segmenter.segment(_image(*shape), frame_index=0)
         assert found.labels.shape == shape
         assert found.labels.dtype == np.uint8
         assert found.labels.max() < len(segmenter.names)
@@ -55,7 +55,7 @@ class SegmenterContract:
         """Twice the same image: twice the same labels, and the image is left as it is."""
         segmenter, image = self.make(), _image(120, 160)
         kept = image.copy()
-        first, again = segmenter.segment(image, 0), segmenter.segment(image, 0)
+        first, again = (segmenter.segment(image, frame_index=0) for _ in range(2))
         assert np.array_equal(first.labels, again.labels)
         assert np.array_equal(image, kept)
 

@@ -12,11 +12,11 @@ from semslam.files import cache_arrays, read_arrays
 from semslam.loop.segmentation.photos import UInt8Array
 from semslam.loop.segmentation.segmenter import Segmenter
 from semslam.plugins import load
-from semslam.types import LabelMap
+from semslam.types import Float32Array, LabelMap
 
 
 class CachedSegmenter:
-    """Caches another segmenter's label maps, by the content of the image and the segmenter's fingerprint.
+    """Caches another segmenter's label maps, by the content of image and depth and the segmenter's fingerprint.
 
     Files are written whole or not at all; one that cannot be read is made anew. Confidences are kept in 255
     steps, and given back so on the first answer too: a run is the same with a warm and a cold cache.
@@ -48,20 +48,27 @@ class CachedSegmenter:
         """The inner segmenter's classes."""
         return self._inner.names
 
-    def segment(self, color: UInt8Array, frame_index: int | None = None) -> LabelMap:
+    def segment(self, color: UInt8Array, depth: Float32Array | None = None, frame_index: int | None = None) -> LabelMap:
         """Read the labels of an image (H, W, 3) from the cache, or compute and store them."""
         if not self.fingerprint:
-            return self._inner.segment(color, frame_index)
-        key = hashlib.sha256(self.fingerprint.encode() + str(color.shape).encode() + color.tobytes()).hexdigest()
+            return self._inner.segment(color, depth, frame_index)
+        key = self._key(color, depth)
         path = self._folder / key[:2] / f"{key}.npz"
         kept = self._read(path, color.shape[:2])
         if kept is None:
-            answer = self._inner.segment(color, frame_index)
+            answer = self._inner.segment(color, depth, frame_index)
             steps = None if answer.confidence is None else np.round(answer.confidence * 255).astype(np.uint8)
             kept = (answer.labels, steps)
             cache_arrays(path, labels=answer.labels, **({} if steps is None else {"confidence": steps}))
         labels, steps = kept
         return LabelMap(labels, self.names, None if steps is None else steps.astype(np.float32) / np.float32(255))
+
+    def _key(self, color: UInt8Array, depth: Float32Array | None) -> str:
+        """A name for what the answer depends on."""
+        key = hashlib.sha256(self.fingerprint.encode() + str(color.shape).encode() + color.tobytes())
+        if depth is not None:
+            key.update(str(depth.shape).encode() + np.ascontiguousarray(depth).tobytes())
+        return key.hexdigest()
 
     def _read(self, path: Path, size: tuple[int, ...]) -> tuple[UInt8Array, UInt8Array | None] | None:
         """What was kept, or None where it is missing, damaged or something else."""

@@ -7,7 +7,7 @@ import numpy as np
 from semslam.config import Config
 from semslam.loop.segmentation.classes import NYU40_NAMES
 from semslam.loop.segmentation.photos import UInt8Array
-from semslam.types import LabelMap
+from semslam.types import Float32Array, LabelMap
 
 
 class ConstantSegmenter:
@@ -22,7 +22,7 @@ class ConstantSegmenter:
         """Take no settings."""
         return cls()
 
-    def segment(self, color: UInt8Array, frame_index: int | None = None) -> LabelMap:
+    def segment(self, color: UInt8Array, depth: Float32Array | None = None, frame_index: int | None = None) -> LabelMap:
         """Label an RGB image (H, W, 3) uint8."""
         shape = color.shape[:2]
         return LabelMap(np.ones(shape, dtype=np.uint8), self.names, np.ones(shape, dtype=np.float32))

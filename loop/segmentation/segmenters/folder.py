@@ -12,7 +12,7 @@ from semslam.errors import ConfigError, DatasetError
 from semslam.files import read_text
 from semslam.loop.segmentation.classes import NYU40_NAMES
 from semslam.loop.segmentation.photos import UInt8Array
-from semslam.types import LabelMap
+from semslam.types import Float32Array, LabelMap
 
 NAMES_FILE = "classes.txt"
 MAX_CLASSES = 256
@@ -58,7 +58,7 @@ class FolderSegmenter:
             raise ConfigError("The segmenter 'folder' needs the setting 'segmentation.labels_dir'.")
         return cls(folder)
 
-    def segment(self, color: UInt8Array, frame_index: int | None = None) -> LabelMap:
+    def segment(self, color: UInt8Array, depth: Float32Array | None = None, frame_index: int | None = None) -> LabelMap:
         """Look up the labels of frame ``frame_index``, enlarged to the image's size by nearest neighbour.
 
         Raises:

@@ -14,7 +14,7 @@ from semslam.loop.segmentation.classes import NYU40_NAMES
 from semslam.loop.segmentation.decoding import decode, input_size, shrink
 from semslam.loop.segmentation.photos import UInt8Array
 from semslam.loop.segmentation.shipped import CHECKPOINT, INT8_GRAPH
-from semslam.types import LabelMap
+from semslam.types import Float32Array, LabelMap
 
 
 class OnnxSegmenter:
@@ -52,7 +52,7 @@ class OnnxSegmenter:
         """The 40 NYUv2 classes after void."""
         return NYU40_NAMES
 
-    def segment(self, color: UInt8Array, frame_index: int | None = None) -> LabelMap:
+    def segment(self, color: UInt8Array, depth: Float32Array | None = None, frame_index: int | None = None) -> LabelMap:
         """Label an RGB image (H, W, 3) uint8."""
         image = shrink(color, self._size)
         logits = self._session.run(["logits"], {"image": image[None]})[0]

@@ -9,7 +9,7 @@ from semslam.loop.segmentation.classes import NYU40_NAMES
 from semslam.loop.segmentation.decoding import decode, input_size, shrink
 from semslam.loop.segmentation.photos import UInt8Array
 from semslam.loop.segmentation.shipped import CHECKPOINT
-from semslam.types import LabelMap
+from semslam.types import Float32Array, LabelMap
 
 
 class TorchSegmenter:
@@ -50,7 +50,7 @@ class TorchSegmenter:
         """The 40 NYUv2 classes after void."""
         return NYU40_NAMES
 
-    def segment(self, color: UInt8Array, frame_index: int | None = None) -> LabelMap:
+    def segment(self, color: UInt8Array, depth: Float32Array | None = None, frame_index: int | None = None) -> LabelMap:
         """Label an RGB image (H, W, 3) uint8."""
         import torch
 

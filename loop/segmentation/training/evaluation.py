@@ -66,7 +66,7 @@ def evaluate(
             color = shrink(color, size)
             truth = np.asarray(cv2.resize(truth, size, interpolation=cv2.INTER_NEAREST), dtype=np.uint8)
         start = time.perf_counter()
-        labels = segmenter.segment(color, i).labels
+        labels = segmenter.segment(color, frame_index=i).labels
         times.append(time.perf_counter() - start)
         confusion += confusion_matrix(truth, labels)
         report(i + 1, len(names))

@@ -77,7 +77,8 @@ def build_semantic_map(views: Iterable[PosedView], segmenter: Segmenter, voxel: 
     for view in views:
         samples = sample(view)
         surface.add(view, samples)
-        labels.add(view.keyframe, samples, segmenter.segment(view.frame.color, view.frame.source_index))
+        found = segmenter.segment(view.frame.color, view.frame.depth, view.frame.source_index)
+        labels.add(view.keyframe, samples, found)
     cloud = surface.cloud()
     beliefs = smooth(labels.votes, cloud, voxel)
     heard = labels.votes.any(axis=1)

@@ -15,7 +15,7 @@ class Counting:
     def __init__(self, fingerprint="one", confident=True):
         self.fingerprint, self.confident, self.calls = fingerprint, confident, 0
 
-    def segment(self, color, frame_index=None):
+    def segment(self, color, depth=None, frame_index=None):
         self.calls += 1
         confidence = np.linspace(0, 1, color[..., 0].size, dtype=np.float32).reshape(color.shape[:2])
         return LabelMap((color[..., 0] > 127).astype(np.uint8), self.names, confidence if self.confident else None)

@@ -102,10 +102,10 @@ def test_checkpoint_runs_through_onnx(tmp_path):
 
 def test_folder_by_index(labels_folder):
     segmenter = FolderSegmenter(labels_folder)
-    assert (segmenter.segment(some_image(), 2).labels == 3).all()
+    assert (segmenter.segment(some_image(), frame_index=2).labels == 3).all()
     assert segmenter.names == NYU40_NAMES
     with pytest.raises(DatasetError, match="frame 7"):
-        segmenter.segment(some_image(), 7)
+        segmenter.segment(some_image(), frame_index=7)
     with pytest.raises(DatasetError, match="frame None"):
         segmenter.segment(some_image())
 
@@ -116,10 +116,10 @@ def test_folder_by_stamp_order_with_own_classes(tmp_path):
         cv2.imwrite(str(tmp_path / f"{stamp}.png"), np.full((5, 5), i, np.uint8))
     segmenter = FolderSegmenter(tmp_path)
     assert segmenter.names == ("void", "robot")
-    assert (segmenter.segment(some_image(), 1).labels == 1).all()
+    assert (segmenter.segment(some_image(), frame_index=1).labels == 1).all()
     cv2.imwrite(str(tmp_path / "1305031102.160407.png"), np.full((5, 5), 2, np.uint8))
     with pytest.raises(DatasetError, match="beyond the 2"):
-        segmenter.segment(some_image(), 0)
+        segmenter.segment(some_image(), frame_index=0)
 
 
 def test_folder_faults_are_one_sentence(tmp_path, labels_folder):
@@ -129,7 +129,7 @@ def test_folder_faults_are_one_sentence(tmp_path, labels_folder):
         build_segmenter(load_config(overrides={"segmentation": {"name": "folder"}}))
     (labels_folder / "000001.png").write_bytes(b"torn")
     with pytest.raises(DatasetError, match="damaged"):
-        FolderSegmenter(labels_folder).segment(some_image(), 1)
+        FolderSegmenter(labels_folder).segment(some_image(), frame_index=1)
 
 
 def test_features_are_a_sixteenth():
@@ -156,7 +156,7 @@ def test_folder_labels_belong_to_the_image_whichever_frames_are_read(tmp_path, w
         cv2.imwrite(str(tmp_path / f"{number:04d}.png"), np.full((8, 8), number, np.uint8))
     segmenter = FolderSegmenter(tmp_path)
     frames = Selection(wall, start=1, stride=4)
-    shown = [segmenter.segment(frame.color, frame.source_index).labels[0, 0] for frame in frames]
+    shown = [segmenter.segment(frame.color, frame.depth, frame.source_index).labels[0, 0] for frame in frames]
     assert shown == [1, 5, 9]
 
 
@@ -164,7 +164,7 @@ def test_folder_labels_of_16_bits_do_not_wrap(tmp_path):
     cv2.imwrite(str(tmp_path / "0.png"), np.full((8, 8), 300, np.uint16))
     (tmp_path / "classes.txt").write_text("void\n" + "".join(f"class {i}\n" for i in range(255)))
     with pytest.raises(DatasetError, match="holds the label 300"):
-        FolderSegmenter(tmp_path).segment(np.zeros((8, 8, 3), np.uint8), 0)
+        FolderSegmenter(tmp_path).segment(np.zeros((8, 8, 3), np.uint8), frame_index=0)
     (tmp_path / "classes.txt").write_text("void\n" + "".join(f"class {i}\n" for i in range(400)))
     with pytest.raises(DatasetError, match="401 names; labels go up to 255"):
         FolderSegmenter(tmp_path)

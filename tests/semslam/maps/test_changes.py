@@ -30,7 +30,7 @@ class Boards:
     def views(self) -> list[PosedView]:
         return [PosedView(i, self._frame(i, T), T) for i, T in enumerate(POSES)]
 
-    def segment(self, color: np.ndarray, frame_index: int | None = None) -> LabelMap:
+    def segment(self, color: np.ndarray, depth: np.ndarray | None = None, frame_index: int | None = None) -> LabelMap:
         labels = self._labels[frame_index or 0]
         return LabelMap(labels, NAMES, np.full(labels.shape, 0.9, np.float32))
 

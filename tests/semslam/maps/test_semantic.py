@@ -34,7 +34,7 @@ class TrueLabels:
     names: tuple[str, ...] = NYU40_NAMES
     fingerprint: str = ""
 
-    def segment(self, color: np.ndarray, frame_index: int | None = None) -> LabelMap:
+    def segment(self, color: np.ndarray, depth: np.ndarray | None = None, frame_index: int | None = None) -> LabelMap:
         assert frame_index is not None
         labels = self.dataset.labels(frame_index).copy()
         rng = np.random.default_rng(frame_index)
@@ -164,7 +164,9 @@ def test_a_view_without_labels_or_depth_adds_nothing(room: SyntheticDataset, vie
     nothing = LabelMap(np.zeros((120, 160), np.uint8), NYU40_NAMES)
 
     class Void(TrueLabels):
-        def segment(self, color: np.ndarray, frame_index: int | None = None) -> LabelMap:
+        def segment(
+            self, color: np.ndarray, depth: np.ndarray | None = None, frame_index: int | None = None
+        ) -> LabelMap:
             return nothing
 
     built = build_semantic_map(views[:2], Void(room), voxel=0.1)
