@@ -1,4 +1,4 @@
-"""Folders in the NYUv2 layout: ``rgb/NAME.jpg``, ``labels40/NAME.png`` and lists of names."""
+"""Folders in the NYUv2 layout: ``rgb/NAME.jpg``, ``labels40/NAME.png``, lists of names, perhaps ``depth/NAME.png``."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -6,10 +6,11 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from semslam.datasets.images import read_color, read_labels
+from semslam.datasets.images import read_color, read_labels, read_relative_depth
 from semslam.errors import DatasetError
 from semslam.files import read_text
 from semslam.loop.segmentation.classes import CLASS_COUNT
+from semslam.types import Float32Array
 
 UInt8Array = npt.NDArray[np.uint8]
 _SUFFIXES = (".jpg", ".jpeg", ".png")
@@ -17,11 +18,19 @@ _SUFFIXES = (".jpg", ".jpeg", ".png")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Photo:
-    """A labelled photo: color (H, W, 3) uint8 RGB and labels (H, W) uint8, 0 = void."""
+    """A labelled photo.
+
+    Attributes:
+        name: of its files.
+        color: (H, W, 3) uint8 RGB.
+        labels: (H, W) uint8, 0 = void.
+        depth: (h, w) float32 of any size and unit, aligned with the photo, 0 = unknown; None where there is none.
+    """
 
     name: str
     color: UInt8Array
     labels: UInt8Array
+    depth: Float32Array | None = None
 
 
 def list_names(directory: Path, split: str) -> list[str]:
@@ -51,7 +60,17 @@ def read_photo(directory: Path, name: str) -> Photo:
     labels = read_labels(label_path, classes=CLASS_COUNT + 1)
     if labels.shape != color.shape[:2]:
         raise DatasetError(f"The label image {label_path} has another size than its photo.")
-    return Photo(name, color, labels)
+    return Photo(name, color, labels, read_photo_depth(directory, name))
+
+
+def read_photo_depth(directory: Path, name: str) -> Float32Array | None:
+    """Depth (h, w) of a photo from ``depth/NAME.png``, in a unit of its own; None where there is no such file.
+
+    Raises:
+        DatasetError: the file is damaged or has more than one channel.
+    """
+    path = directory / "depth" / f"{name}.png"
+    return read_relative_depth(path) if path.is_file() else None
 
 
 def read_photos(directory: Path, split: str) -> list[Photo]:

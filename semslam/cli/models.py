@@ -3,7 +3,7 @@
 import json
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 from rich.table import Table
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from semslam.config import Config
     from semslam.loop.segmentation.training.evaluation import SegmentationScore
     from semslam.loop.segmentation.training.training import Progress
-    from semslam.types import UInt8Array
+    from semslam.types import Float32Array, UInt8Array
 
 IMAGES = (".png", ".jpg", ".jpeg")
 
@@ -35,7 +35,7 @@ def segment_command(
     config: options.ConfigFile = None,
     overrides: options.Settings = None,
 ) -> None:
-    """Label images: an overlay with a legend and a label image for each."""
+    """Label images: an overlay with a legend and a label image for each; a sequence's depth is used."""
     import cv2
 
     from semslam.loop.segmentation.build import build_segmenter
@@ -47,11 +47,11 @@ def segment_command(
     with writing(out_directory), bar("segmenting", len(images), "images") as update:
         for folder in ("overlays", "labels"):
             (out_directory / folder).mkdir(parents=True, exist_ok=True)
-        for done, (stem, color) in enumerate(_images(path, images), start=1):
-            label_map = segmenter.segment(color)
-            overlay = draw_overlay(color, label_map)
-            _write(out_directory / "overlays" / f"{stem}.jpg", cv2.imencode(".jpg", overlay[..., ::-1])[1])
-            _write(out_directory / "labels" / f"{stem}.png", cv2.imencode(".png", label_map.labels)[1])
+        for done, image in enumerate(_images(path, images), start=1):
+            label_map = segmenter.segment(image.color, image.depth)
+            overlay = draw_overlay(image.color, label_map)
+            _write(out_directory / "overlays" / f"{image.stem}.jpg", cv2.imencode(".jpg", overlay[..., ::-1])[1])
+            _write(out_directory / "labels" / f"{image.stem}.png", cv2.imencode(".png", label_map.labels)[1])
             update(done, len(images))
     out.print(f"{len(images)} images labelled in {out_directory}", soft_wrap=True)
 
@@ -109,15 +109,16 @@ def evaluate_command(
     split: Annotated[str, typer.Option(help="Name of the list of photos.")] = "val.txt",
     config: options.ConfigFile = None,
     overrides: options.Settings = None,
+    depth: Annotated[bool, typer.Option("--depth/--no-depth", help="Use depth/NAME.png where there is one.")] = True,
     as_json: options.Json = False,
 ) -> None:
-    """Score a segmenter on labelled photos."""
+    """Score a segmenter on labelled photos, with their depth where there is any."""
     from semslam.loop.segmentation.build import build_segmenter
     from semslam.loop.segmentation.training.evaluation import evaluate
 
     segmenter = build_segmenter(options.settings(config, overrides))
     with bar(split, None, "photos") as update:
-        score = evaluate(segmenter, directory, split, report=update)
+        score = evaluate(segmenter, directory, split, with_depth=depth, report=update)
     if as_json:
         typer.echo(json.dumps(asdict(score)))
     else:
@@ -150,16 +151,25 @@ def _image_names(path: str) -> "Iterator[str | int]":
     yield from range(len(open_dataset(path)))
 
 
-def _images(path: str, names: "list[str | int]") -> "Iterator[tuple[str, UInt8Array]]":
+class _Image(NamedTuple):
+    """An image to label: its file's name without ending, RGB (H, W, 3), and depth (H, W) in metres of a frame."""
+
+    stem: str
+    color: "UInt8Array"
+    depth: "Float32Array | None" = None
+
+
+def _images(path: str, names: "list[str | int]") -> "Iterator[_Image]":
     from semslam.datasets import open_dataset
     from semslam.datasets.images import read_color
 
     dataset = open_dataset(path) if names and isinstance(names[0], int) else None
     for name in names:
         if isinstance(name, str):
-            yield Path(name).stem, read_color(Path(name))
+            yield _Image(Path(name).stem, read_color(Path(name)))
         elif dataset is not None:
-            yield f"{name:06d}", dataset.frame(name).color
+            frame = dataset.frame(name)
+            yield _Image(f"{name:06d}", frame.color, frame.depth)
 
 
 def _write(path: Path, encoded: "UInt8Array") -> None:
@@ -189,6 +199,6 @@ COMMANDS = (
         "eval-segmenter",
         evaluate_command,
         "Score a segmenter on labelled photos: mean IoU, pixel accuracy, mean class accuracy, IoU per class.",
-        example("semslam eval-segmenter nyuv2 --split val.txt --json"),
+        example("semslam eval-segmenter nyuv2 --split val.txt --json", "semslam eval-segmenter nyuv2 --no-depth"),
     ),
 )

@@ -140,6 +140,18 @@ def to_metres(raw: AnyImage, scale: DepthScale) -> Float32Array:
     return depth
 
 
+def read_relative_depth(path: Path) -> Float32Array:
+    """Read a depth image of 8 or 16 bits whose unit does not matter, as (H, W) float32; 0 where there is none.
+
+    Raises:
+        DatasetError: the file is missing, damaged or no depth image.
+    """
+    raw = _decode(_content(path, "The depth image"), cv2.IMREAD_UNCHANGED, f"The depth image {path}")
+    if raw.ndim != 2 or not np.issubdtype(raw.dtype, np.unsignedinteger):
+        raise DatasetError(f"The depth image {path} is not one channel of whole numbers.")
+    return raw.astype(np.float32)
+
+
 def read_labels(path: Path, size: tuple[int, int] | None = None, classes: int = 256) -> UInt8Array:
     """Read a label image, one channel of 8 or 16 bits, as (H, W) uint8.
 

@@ -10,11 +10,9 @@ from onnx.utils import Extractor
 from semslam.config import Config
 from semslam.errors import ModelError
 from semslam.loop.segmentation.decoding import input_size, shrink
-from semslam.loop.segmentation.segmenters.onnx import load_graph, open_session
+from semslam.loop.segmentation.segmenters.onnx import FEATURES, IMAGE, load_graph, open_session
 from semslam.types import Float32Array, UInt8Array
 
-IMAGE, MIDDLE = "image", "features"
-"""The graph's names of its input and of the thirteenth block's output."""
 AFTER_ENCODER = "/network/aspp/point/conv/Conv"
 """The node that reads the encoder's last output, which the graph gives no name of its own."""
 
@@ -51,10 +49,10 @@ class Backbone:
         except Exception as error:  # protobuf's errors are its own
             raise ModelError("The network weights are damaged or not an ONNX graph.") from error
         high = next((node.input[0] for node in model.graph.node if node.name == AFTER_ENCODER), None)
-        if high is None or MIDDLE not in {out.name for out in model.graph.output}:
+        if high is None or FEATURES not in {out.name for out in model.graph.output}:
             raise ModelError("The ONNX graph is not one that semslam exported.")
         model.graph.output.append(onnx.helper.make_tensor_value_info(high, onnx.TensorProto.FLOAT, None))
-        outputs = [MIDDLE, high] if deep else [MIDDLE]
+        outputs = [FEATURES, high] if deep else [FEATURES]
         part = Extractor(model).extract_model([IMAGE], outputs)
         self._session = open_session(part.SerializeToString(), size, threads, outputs)
         self.size = size

@@ -29,14 +29,15 @@ def read_tensors(path: Path) -> dict[str, Tensor]:
 
 
 def load_network(path: Path) -> DeepLab:
-    """The MobileNetV2 network of a checkpoint, with a decoder as wide as it was trained.
+    """The MobileNetV2 network of a checkpoint, with the decoder's width and the depth branch that it was trained with.
 
     Raises:
         ModelError: the file cannot be read or belongs to another network.
     """
     state = read_tensors(path)
     try:
-        network = build_mobilenet_deeplab(decoder_channels=state["classifier.weight"].shape[1])
+        width, depth = state["classifier.weight"].shape[1], "depth.stem.conv.weight" in state
+        network = build_mobilenet_deeplab(decoder_channels=width, depth=depth)
         network.load_state_dict(state)
     except (KeyError, IndexError, RuntimeError) as error:
         raise ModelError(f"The weights {path} belong to another network.") from error

@@ -42,6 +42,11 @@ class ConvNorm(nn.Module):
         self.norm = nn.BatchNorm2d(out, eps=1e-3, momentum=0.05)
         self.activation = nn.ReLU6() if activate else nn.Identity()
 
+    def keep_size(self) -> None:
+        """Give up the stride; the weights stay."""
+        self.stride, self.conv.stride = 1, (1, 1)
+        self.conv.padding = ((self.conv.kernel_size[0] - 1) // 2,) * 2
+
     def forward(self, x: Tensor) -> Tensor:
         """(B, inside, H, W) to (B, out, H / stride, W / stride)."""
         if self.stride == 2 and self.conv.kernel_size[0] == 3:

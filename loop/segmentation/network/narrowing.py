@@ -45,12 +45,14 @@ def narrow_decoder(network: DeepLab, channels: int, images: Tensor) -> DeepLab:
         images: (B, 3, H, W) in -1..1, on which the channels are compared.
 
     Raises:
-        ModelError: the network's decoder is narrower already.
+        ModelError: the network's decoder is narrower already, or it sees depth.
     """
     if channels > network.decoder_channels:
         raise ModelError(f"The decoder has {network.decoder_channels} channels; it cannot be given {channels}.")
     if channels == network.decoder_channels:
         return network
+    if network.depth is not None:
+        raise ModelError("A network that sees depth cannot be narrowed; narrow it before the depth branch is added.")
     reader = network.get_submodule("decoder.1.1.conv")
     assert isinstance(reader, nn.Conv2d)
     first = _fit(*_cells_of(network, reader, images), channels)

@@ -12,9 +12,13 @@ from semslam.config import Config
 from semslam.errors import ModelError
 from semslam.loop.segmentation.classes import NYU40_NAMES
 from semslam.loop.segmentation.decoding import decode, input_size, shrink
+from semslam.loop.segmentation.depth_picture import depth_picture, picture_size
 from semslam.loop.segmentation.photos import UInt8Array
 from semslam.loop.segmentation.shipped import CHECKPOINT, INT8_GRAPH
 from semslam.types import Float32Array, LabelMap
+
+IMAGE, DEPTH, LOGITS, FEATURES = "image", "depth", "logits", "features"
+"""Names of the graph's inputs, of which a network that sees colour alone has the first, and of its outputs."""
 
 
 class OnnxSegmenter:
@@ -53,9 +57,9 @@ class OnnxSegmenter:
         return NYU40_NAMES
 
     def segment(self, color: UInt8Array, depth: Float32Array | None = None, frame_index: int | None = None) -> LabelMap:
-        """Label an RGB image (H, W, 3) uint8."""
-        image = shrink(color, self._size)
-        logits = self._session.run(["logits"], {"image": image[None]})[0]
+        """Label an RGB image (H, W, 3) uint8; ``depth`` is used where the network sees depth."""
+        pictures = network_input(self._session, color, depth, self._size)
+        logits = self._session.run([LOGITS], pictures)[0]
         return decode(np.asarray(logits)[0], (color.shape[1], color.shape[0]), self._min_confidence)
 
 
@@ -77,8 +81,18 @@ def load_graph(weights: Path | None, precision: str) -> bytes:
         raise ModelError(f"There are no network weights at {path}.") from error
 
 
+def network_input(
+    session: onnxruntime.InferenceSession, color: UInt8Array, depth: Float32Array | None, size: tuple[int, int]
+) -> dict[str, UInt8Array]:
+    """What a network takes of an image (H, W, 3) with its depth (H, W), which may be missing, by the inputs' names."""
+    pictures = {IMAGE: shrink(color, size)[None]}
+    if DEPTH in {given.name for given in session.get_inputs()}:
+        pictures[DEPTH] = depth_picture(depth, picture_size(size))[None]
+    return pictures
+
+
 def open_session(
-    graph: bytes, size: tuple[int, int], threads: int, needed: Collection[str] = ("logits", "features")
+    graph: bytes, size: tuple[int, int], threads: int, needed: Collection[str] = (LOGITS, FEATURES)
 ) -> onnxruntime.InferenceSession:
     """Open a graph for inputs of one size.
 
@@ -96,13 +110,14 @@ def open_session(
     options.inter_op_num_threads = 1
     options.log_severity_level = 3
     options.add_session_config_entry("session.intra_op.allow_spinning", "0")
-    options.add_free_dimension_override_by_name("width", size[0])
-    options.add_free_dimension_override_by_name("height", size[1])
+    half = picture_size(size)
+    for name, length in zip(("width", "height", "width_2", "height_2"), (*size, *half), strict=True):
+        options.add_free_dimension_override_by_name(name, length)
     try:
         session = onnxruntime.InferenceSession(graph, options, providers=["CPUExecutionProvider"])
     except Exception as error:  # the runtime's errors have no common base of their own
         raise ModelError("The network weights are damaged or not an ONNX graph.") from error
     outputs = {out.name for out in session.get_outputs()}
-    if [i.name for i in session.get_inputs()] != ["image"] or not set(needed) <= outputs:
+    if [i.name for i in session.get_inputs()] not in ([IMAGE], [IMAGE, DEPTH]) or not set(needed) <= outputs:
         raise ModelError("The ONNX graph is not one that semslam exported.")
     return session

@@ -7,6 +7,7 @@ from typing import Self
 from semslam.config import Config
 from semslam.loop.segmentation.classes import NYU40_NAMES
 from semslam.loop.segmentation.decoding import decode, input_size, shrink
+from semslam.loop.segmentation.depth_picture import depth_picture, picture_size
 from semslam.loop.segmentation.photos import UInt8Array
 from semslam.loop.segmentation.shipped import CHECKPOINT
 from semslam.types import Float32Array, LabelMap
@@ -51,10 +52,14 @@ class TorchSegmenter:
         return NYU40_NAMES
 
     def segment(self, color: UInt8Array, depth: Float32Array | None = None, frame_index: int | None = None) -> LabelMap:
-        """Label an RGB image (H, W, 3) uint8."""
+        """Label an RGB image (H, W, 3) uint8; ``depth`` is used where the network sees depth."""
         import torch
 
+        from semslam.loop.segmentation.network.network import to_input
+
         with torch.inference_mode():
-            pixels = torch.from_numpy(shrink(color, self._size)[None])
-            logits, _ = self._network(pixels.permute(0, 3, 1, 2).float() / 127.5 - 1.0)
+            pictures = [to_input([shrink(color, self._size)])]
+            if self._network.depth is not None:
+                pictures.append(to_input([depth_picture(depth, picture_size(self._size))]))
+            logits, _ = self._network(*pictures)
         return decode(logits[0].numpy(), (color.shape[1], color.shape[0]), self._min_confidence)

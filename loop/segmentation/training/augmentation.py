@@ -1,7 +1,7 @@
 """Augmentation: random views of a labelled photo, as from a hand-held camera."""
 
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import Generic, TypeVar
 
 import cv2
 import numpy as np
@@ -9,9 +9,9 @@ import numpy.typing as npt
 
 from semslam.geometry.se3 import Float32Array, FloatArray
 from semslam.loop.segmentation.photos import UInt8Array
+from semslam.loop.segmentation.training.example import GREY
 
 Label = TypeVar("Label", np.uint8, np.uint16)
-GREY = (127, 127, 127)
 PLAIN_LOG_ZOOM = (-0.4, 0.45)
 PLAIN_ROLL = 5.0
 PLAIN_LIGHT = 0.4
@@ -19,10 +19,25 @@ STRONG_ROLL = 45.0
 HALF = 0.6
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class View(Generic[Label]):
+    """A view of a photo; all images (h, w) are of one size and aligned.
+
+    Attributes:
+        color: (h, w, 3) uint8 RGB.
+        labels: (h, w), 0 where the view leaves the photo.
+        depth: (h, w) float32, 0 = unknown; None where the photo has none.
+    """
+
+    color: UInt8Array
+    labels: npt.NDArray[Label]
+    depth: Float32Array | None = None
+
+
 def random_view(
     color: UInt8Array, labels: npt.NDArray[Label], size: tuple[int, int], rng: np.random.Generator,
-    strong_share: float = 0.0,
-) -> tuple[UInt8Array, npt.NDArray[Label]]:  # fmt: skip
+    strong_share: float = 0.0, depth: Float32Array | None = None,
+) -> View[Label]:  # fmt: skip
     """Draw a view: zoomed, mirrored, cropped and a little relit; or a strong one, as from a hand in motion.
 
     Args:
@@ -31,49 +46,29 @@ def random_view(
         size: width and height of the view in pixels.
         rng: draws everything.
         strong_share: share of views that are taken from close by or turned, badly lit, blurred and noisy.
-
-    Returns:
-        Colour (height, width, 3) and labels (height, width), 0 where the view leaves the photo.
+        depth: (h, w) of the whole photo in any resolution, 0 = unknown.
     """
     strong = bool(rng.random() < strong_share)
     placement = _strong_placement(rng) if strong else _plain_placement(rng)
     matrix, scale = placement.map_of(color.shape[1], color.shape[0], *size, rng)
     view_labels = cv2.warpAffine(labels, matrix, size, flags=cv2.INTER_NEAREST, borderValue=0)
+    view_depth = None if depth is None else _warp_depth(depth, matrix, color.shape, size)
     if scale < HALF:  # bilinear sampling of a photo more than half as large again would alias
         color = cv2.resize(color, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA).astype(np.uint8)
         matrix = matrix * np.array([2.0, 2.0, 1.0])
-    view = cv2.warpAffine(color, matrix, size, flags=cv2.INTER_LINEAR, borderValue=GREY)
+    view = cv2.warpAffine(color, matrix, size, flags=cv2.INTER_LINEAR, borderValue=(GREY,) * 3)
     light = _relight(view.astype(np.float32), rng, 1.0 if strong else PLAIN_LIGHT)
     lit = _degrade(light, rng) if strong else np.clip(np.round(light), 0, 255).astype(np.uint8)
-    return lit, view_labels.astype(labels.dtype, copy=False)
+    return View(lit, view_labels.astype(labels.dtype, copy=False), view_depth)
 
 
-def paste_patch(
-    view: UInt8Array, target: Float32Array, other_view: UInt8Array, other_target: Float32Array,
-    rng: np.random.Generator,
-) -> None:  # fmt: skip
-    """Paste a rectangle of another view with its targets, so that objects appear out of context (CutMix).
-
-    CutMix (Yun et al., ICCV 2019), for segmentation after French et al. (BMVC 2020). The rectangle covers about a
-    tenth to a half of the view.
-
-    Args:
-        view: (H, W, 3), changed in place, as ``target``.
-        target: (h, w, C), h and w dividing H and W by the same stride.
-        other_view: as ``view``.
-        other_target: as ``target``.
-        rng: draws everything.
-    """
-    stride = view.shape[0] // target.shape[0]
-    area, stretch = rng.uniform(0.1, 0.5), np.exp(rng.uniform(-0.5, 0.5))
-    cells, pixels = [], []
-    for side, share in zip(target.shape, (np.sqrt(area) / stretch, np.sqrt(area) * stretch), strict=False):
-        length = min(side, max(1, round(side * share)))
-        first = int(rng.integers(side - length + 1))
-        cells.append(slice(first, first + length))
-        pixels.append(slice(stride * first, stride * (first + length)))
-    view[*pixels] = other_view[*pixels]
-    target[*cells] = other_target[*cells]
+def _warp_depth(depth: Float32Array, matrix: FloatArray, photo: tuple[int, ...], size: tuple[int, int]) -> Float32Array:
+    """Depth (h, w) seen through a map (2, 3) from the pixels of a photo of another resolution."""
+    to_photo = np.eye(3)
+    for axis, (pixels, cells) in enumerate(((photo[1], depth.shape[1]), (photo[0], depth.shape[0]))):
+        to_photo[axis, axis], to_photo[axis, 2] = pixels / cells, (pixels / cells - 1) / 2
+    warped = cv2.warpAffine(depth, matrix @ to_photo, size, flags=cv2.INTER_NEAREST, borderValue=0)
+    return np.asarray(warped, dtype=np.float32)
 
 
 @dataclass(frozen=True, slots=True)

@@ -41,6 +41,7 @@ def evaluate(
     directory: Path,
     split: str = "val.txt",
     size: tuple[int, int] | None = SIZE,
+    with_depth: bool = True,
     report: Callable[[int, int], None] = lambda _done, _total: None,
 ) -> SegmentationScore:
     """Score a segmenter on a split.
@@ -51,6 +52,7 @@ def evaluate(
         split: name of the list of photos.
         size: (width, height) that photos (averaged) and true labels (nearest neighbour) are resized to first;
             None = compare at the photos' own size.
+        with_depth: whether the segmenter gets the photos' depth, where there is any.
         report: called with the photos done and in all.
 
     Raises:
@@ -66,7 +68,7 @@ def evaluate(
             color = shrink(color, size)
             truth = np.asarray(cv2.resize(truth, size, interpolation=cv2.INTER_NEAREST), dtype=np.uint8)
         start = time.perf_counter()
-        labels = segmenter.segment(color, frame_index=i).labels
+        labels = segmenter.segment(color, photo.depth if with_depth else None, i).labels
         times.append(time.perf_counter() - start)
         confusion += confusion_matrix(truth, labels)
         report(i + 1, len(names))

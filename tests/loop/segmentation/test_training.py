@@ -16,16 +16,13 @@ from semslam.loop.segmentation.network.network import build_mobilenet_deeplab
 from semslam.loop.segmentation.photos import Photo, read_photo
 from semslam.loop.segmentation.segmenters.onnx import load_graph
 from semslam.loop.segmentation.shipped import CHECKPOINT
-from semslam.loop.segmentation.training.augmentation import paste_patch, random_view
+from semslam.loop.segmentation.training.augmentation import random_view
 from semslam.loop.segmentation.training.evaluation import confusion_matrix, evaluate, score
+from semslam.loop.segmentation.training.example import GREY, Example, to_batch
+from semslam.loop.segmentation.training.examples import class_weights, photos_by_class
+from semslam.loop.segmentation.training.optimisation import learning_rate, soft_cross_entropy
 from semslam.loop.segmentation.training.self_training import Teacher, teach
-from semslam.loop.segmentation.training.training import (
-    class_weights,
-    learning_rate,
-    photos_by_class,
-    soft_cross_entropy,
-    train,
-)
+from semslam.loop.segmentation.training.training import train
 from semslam.loop.segmentation.training.training_log import read_log
 
 SIZE = {"width": 64, "height": 48}
@@ -90,6 +87,49 @@ def test_training_learns_and_its_outputs_serve(rooms, tmp_path):
         assert result.per_class_iou["chair"] is None
 
 
+@pytest.fixture
+def deep_rooms(rooms):
+    """The same rooms with depth: the wall stands still, the floor comes nearer."""
+    (rooms / "depth").mkdir()
+    for i in range(6):
+        labels = cv2.imread(str(rooms / "labels40" / f"{i}.png"), cv2.IMREAD_UNCHANGED)
+        below = np.cumsum(labels == 2, axis=0)
+        depth = (250 / (1 + below / 30)).astype(np.uint8)
+        cv2.imwrite(str(rooms / "depth" / f"{i}.png"), cv2.resize(depth, (64, 48), interpolation=cv2.INTER_NEAREST))
+    return rooms
+
+
+def test_a_network_that_sees_depth_learns_from_it_and_serves_without(deep_rooms, tmp_path):
+    chosen = {"depth": True, "start": str(CHECKPOINT), "freeze_norms": True, "encoder_rate": 0, "rate": 3e-3}
+    weights = train(deep_rooms, settings(epochs=20, **chosen, known_rate=0.5), tmp_path / "run")
+    trained, before = read_tensors(weights), read_tensors(CHECKPOINT)
+    assert all(torch.equal(trained[name], before[name]) for name in before if name.startswith("encoder."))
+    for path in (weights, weights.with_name("weights.onnx")):
+        config = load_config(overrides={"segmentation": {**SIZE, "weights": str(path)}})
+        segmenter = build_segmenter(config)
+        for depth in (True, False):
+            assert evaluate(segmenter, deep_rooms, size=None, with_depth=depth).pixel_accuracy > 0.75
+        grey = np.full((96, 128, 3), GREY, np.uint8)
+        depth = read_photo(deep_rooms, "0").depth
+        assert not np.array_equal(segmenter.segment(grey, depth).labels, segmenter.segment(grey).labels)
+    with pytest.raises(ConfigError, match="sees depth"):
+        train(deep_rooms, settings(start=str(weights)), tmp_path / "blind")
+    with pytest.raises(ModelError, match="cannot be narrowed"):
+        train(deep_rooms, settings(start=str(weights), depth=True, decoder_channels=32), tmp_path / "narrow")
+
+
+def test_resumed_training_with_depth_ends_with_the_same_weights(deep_rooms, tmp_path):
+    with pytest.raises(KilledError):
+        train(deep_rooms, settings(depth=True), tmp_path / "torn", kill_at_third)
+    torn, whole = (read_tensors(train(deep_rooms, settings(depth=True), tmp_path / name)) for name in ("torn", "whole"))
+    assert all(torch.equal(whole[name], torn[name]) for name in whole)
+
+
+def test_training_with_depth_needs_depth(rooms, tmp_path):
+    with pytest.raises(DatasetError, match="no depth"):
+        train(rooms, settings(depth=True), tmp_path / "run")
+
+
 def test_damaged_state_is_one_sentence(rooms, tmp_path):
     (tmp_path / "run").mkdir()
     (tmp_path / "run" / "state.pt").write_bytes(b"torn")
@@ -109,7 +149,7 @@ def test_teacher_tells_what_it_believes(rooms, tmp_path):
     probabilities = teacher.probabilities(read_photo(rooms, "0").color)
     assert probabilities.shape == (16, 24, 40)
     np.testing.assert_allclose(probabilities.sum(axis=2), 1.0, atol=1e-5)
-    photo = teach(teacher, rooms / "rgb", tmp_path / "taught")[0]
+    photo = teach(teacher, rooms, rooms / "rgb", tmp_path / "taught")[0]
     assert photo.beliefs.shape == (1 + 16 * 24, 40)
     assert not photo.beliefs[0].any()
     under_first_column = photo.beliefs[photo.cells[3::6, 2]] / 255.0
@@ -159,9 +199,9 @@ def test_faulty_folder_is_one_sentence(rooms, tmp_path, damage, word):
 def test_views_are_drawn_from_the_seed(rooms):
     photo = read_photo(rooms, "0")
     a, b, c = (random_view(photo.color, photo.labels, (64, 48), np.random.default_rng(seed)) for seed in (1, 1, 2))
-    assert np.array_equal(a[0], b[0])
-    assert np.array_equal(a[1], b[1])
-    assert not np.array_equal(a[0], c[0])
+    assert np.array_equal(a.color, b.color)
+    assert np.array_equal(a.labels, b.labels)
+    assert not np.array_equal(a.color, c.color)
 
 
 @pytest.mark.parametrize("strong_share", [0.0, 1.0])
@@ -171,23 +211,47 @@ def test_views_keep_labels_on_their_pixels(strong_share):
     labels[:, 64:] = 2
     color = np.where(labels[..., None] == 2, 230, 20).repeat(3, 2).astype(np.uint8)
     for seed in range(40):
-        view, drawn = random_view(color, labels, (64, 48), np.random.default_rng(seed), strong_share)
-        assert view.shape == (48, 64, 3)
-        inner = cv2.erode((drawn == 2).astype(np.uint8), np.ones((15, 15))) > 0
-        outer = cv2.erode((drawn == 1).astype(np.uint8), np.ones((15, 15))) > 0
+        depth = cv2.resize(labels, (32, 24), interpolation=cv2.INTER_NEAREST).astype(np.float32)
+        view = random_view(color, labels, (64, 48), np.random.default_rng(seed), strong_share, depth)
+        assert view.color.shape == (48, 64, 3)
+        inner = cv2.erode((view.labels == 2).astype(np.uint8), np.ones((15, 15))) > 0
+        outer = cv2.erode((view.labels == 1).astype(np.uint8), np.ones((15, 15))) > 0
+        assert (view.depth[inner] == 2).all()
+        assert (view.depth[outer] == 1).all()
         if inner.any() and outer.any():
-            assert view[inner].mean() > view[outer].mean() + 40
+            assert view.color[inner].mean() > view.color[outer].mean() + 40
 
 
 @given(st.integers(1, 60), st.integers(1, 80), st.integers(0, 10_000))
 def test_a_patch_brings_its_targets_along(height, width, seed):
-    views = [np.full((4 * height, 4 * width, 3), level, np.uint8) for level in (20, 230)]
-    targets = [np.full((height, width, 2), level, np.float32) for level in (20, 230)]
-    paste_patch(views[0], targets[0], views[1], targets[1], np.random.default_rng(seed))
-    assert (views[1] == 230).all()
-    assert (targets[0] == 230).any()
-    assert np.array_equal(views[0][::4, ::4, :2], targets[0])
-    assert np.array_equal(views[0][3::4, 3::4, :2], targets[0])
+    dark, bright = (
+        Example(
+            np.full((4 * height, 4 * width, 3), level, np.uint8),
+            np.full((height, width, 2), level, np.float32),
+            np.full((2 * height, 2 * width, 3), level, np.uint8),
+        )
+        for level in (20, 230)
+    )
+    dark.paste(bright, np.random.default_rng(seed))
+    assert (bright.color == 230).all()
+    assert (dark.target == 230).any()
+    for image, stride in ((dark.color, 4), (dark.picture, 2)):
+        assert np.array_equal(image[::stride, ::stride, :2], dark.target)
+        assert np.array_equal(image[stride - 1 :: stride, stride - 1 :: stride, :2], dark.target)
+
+
+def test_views_lose_colour_or_depth_but_never_both():
+    fates = []
+    for seed in range(200):
+        view = Example(np.zeros((8, 8, 3), np.uint8), np.zeros((2, 2, 40), np.float32), np.full((4, 4, 3), 9, np.uint8))
+        view.hide(0.3, 0.4, np.random.default_rng(seed))
+        fates.append((bool((view.color == GREY).all()), not view.picture.any()))
+    assert (True, True) not in fates
+    assert fates.count((True, False)) == pytest.approx(60, abs=25)
+    assert fates.count((False, True)) == pytest.approx(80, abs=25)
+    inputs, targets = to_batch([view, view])
+    assert [tuple(part.shape) for part in inputs] == [(2, 3, 8, 8), (2, 3, 4, 4)]
+    assert tuple(targets.shape) == (2, 40, 2, 2)
 
 
 def test_photos_are_found_by_their_classes():
