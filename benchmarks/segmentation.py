@@ -17,7 +17,7 @@ import cv2
 import numpy as np
 import torch
 
-from semslam.config import load_config
+from semslam.config import load_config, parse_overrides
 from semslam.datasets import open_dataset
 from semslam.datasets.dataset import Dataset
 from semslam.geometry.se3 import invert, transform_points
@@ -175,7 +175,7 @@ def main() -> None:
     parser.add_argument("table", choices=["speed", "size", "teachers", "steady"])
     parser.add_argument("--data", type=Path, default=Path("../shared/data/nyuv2"))
     parser.add_argument("--sequence", type=Path, default=Path("../shared/data/redkitchen"))
-    parser.add_argument("--weights", type=Path, help="other weights for the table 'steady'")
+    parser.add_argument("--set", action="append", default=[], help="a setting for the table 'steady', KEY=VALUE")
     parser.add_argument("--teachers", type=Path, nargs="+", default=[], help="weights for the table 'teachers'")
     parser.add_argument("--gap", type=int, default=5)
     parser.add_argument("--stride", type=int, default=20)
@@ -190,8 +190,7 @@ def main() -> None:
     elif arguments.table == "teachers":
         teachers_table(arguments.data, arguments.teachers)
     else:
-        settings = {"weights": str(arguments.weights)} if arguments.weights else {}
-        segmenters = {"onnx": build_segmenter(load_config(overrides={"segmentation": settings}))}
+        segmenters = {"onnx": build_segmenter(load_config(overrides=parse_overrides(arguments.set)))}
         steady_table(arguments.sequence, arguments.gap, arguments.stride, segmenters)
 
 
