@@ -86,6 +86,26 @@ DATASETS: dict[str, str] = {
     "sessions": "semslam.datasets.sessions:SessionsDataset",
 }
 
+SETTINGS: dict[str, str] = {
+    "feature_map": "semslam.frontend.feature_map.settings:FeatureMapConfig",
+    "feature": "semslam.frontend.frame_to_frame.feature:FeatureOdometryConfig",
+    "dense": "semslam.frontend.frame_to_frame.dense:DenseConfig",
+    "kiss": "semslam.frontend.kiss:KissConfig",
+    "semantic": "semslam.loop.detectors.semantic.settings:SemanticConfig",
+    "semantic-paper": "semslam.loop.detectors.semantic.settings:PaperSemanticConfig",
+    "fused": "semslam.loop.detectors.fused.settings:FusedConfig",
+    "objects": "semslam.loop.detectors.objects.settings:ObjectsConfig",
+    "topology": "semslam.loop.detectors.topology.settings:TopologyConfig",
+    "subgraph": "semslam.loop.detectors.subgraph.settings:SubgraphConfig",
+    "static-cnn": "semslam.loop.detectors.static_cnn.settings:StaticCnnConfig",
+    "placecnn": "semslam.loop.detectors.placecnn.settings:PlaceCnnConfig",
+    "tnnlost": "semslam.loop.detectors.tnnlost.settings:TnnLostConfig",
+    "pcanet": "semslam.loop.detectors.pcanet.settings:PcaNetConfig",
+    "dbow": "semslam.loop.detectors.bag_of_words.detector:DbowConfig",
+    "conv3": "semslam.loop.detectors.global_descriptor.settings:Conv3Config",
+}
+"""What our implementations declare as ``Settings``, so that settings are listed without importing what they set."""
+
 Group = Literal[
     "semslam.odometry",
     "semslam.detectors",
@@ -122,7 +142,7 @@ class Role:
 ROLES: dict[Group, Role] = {
     "semslam.odometry": Role("odometry", ("name", "reads"), {"from_config": 1, "track": 1}),
     "semslam.detectors": Role("loop detector", ("name", "needs_labels"), {"from_config": 1, "query": 1, "add": 1}),
-    "semslam.segmenters": Role("segmenter", ("name",), {"from_config": 1, "segment": 2}),
+    "semslam.segmenters": Role("segmenter", ("name",), {"from_config": 1, "segment": 3}),
     "semslam.verifiers": Role("loop verifier", ("name",), {"from_config": 1, "verify": 3}),
     "semslam.robust": Role("robust strategy", ("name", "accepts_all"), {"from_config": 1, "solve": 1}),
     "semslam.datasets": Role(
@@ -188,6 +208,20 @@ def load(group: Group, name: str) -> type[Any]:
     if lacks is not None:
         raise ConfigError(f"The plug-in '{name}' ({entry.value}) is no {ROLES[group].noun}: {lacks}.")
     return loaded
+
+
+def declared_settings(group: Group, name: str) -> object:
+    """What an implementation declares as ``Settings``; None where it has none of its own.
+
+    Raises:
+        ConfigError: the name is unknown or its plug-in cannot be used.
+    """
+    if name not in GROUPS[group]:
+        return vars(load(group, name)).get("Settings")
+    if name not in SETTINGS:
+        return None
+    module, _, attribute = SETTINGS[name].partition(":")
+    return getattr(import_module(module), attribute)
 
 
 def outside(group: Group) -> dict[str, EntryPoint]:

@@ -129,7 +129,7 @@ def own_settings(name: str) -> type[Section] | None:
     """The settings that an implementation declares as the section ``name``, or None where none does."""
     for group, known in plugins.named(name):
         try:
-            declared = vars(plugins.load(group, known)).get("Settings")
+            declared = plugins.declared_settings(group, known)
         except ConfigError as error:  # a broken plug-in must not stop a run that does without it
             warnings.warn(str(error), SemslamWarning, stacklevel=2)
             continue
@@ -144,7 +144,7 @@ def check_plugin(group: plugins.Group, name: str) -> None:
     Raises:
         ConfigError: it cannot be used; the sentence states what is wrong.
     """
-    declared = vars(plugins.load(group, name)).get("Settings")
+    declared = plugins.declared_settings(group, name)
     if declared is None:
         return
     try:

@@ -25,7 +25,7 @@ from semslam.eval.pairs.reader import read_pair_folder
 from semslam.eval.trajectory import poses_at
 from semslam.frontend.keyframes import KeyframeBuilder
 from semslam.geometry.se3 import FloatArray, Transform, invert
-from semslam.loop.detectors.fused.detector import FusedConfig
+from semslam.loop.detectors.fused.settings import FusedConfig
 from semslam.loop.segmentation.build import build_segmenter
 from semslam.studies.detectors import PROBABILISTIC, check_scorable, exhaustive_detector
 from semslam.types import Frame, KeyframeView

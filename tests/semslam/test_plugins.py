@@ -1,6 +1,8 @@
 """Parts from outside are held against their role before a run, and by ``semslam doctor``."""
 
 import inspect
+import subprocess
+import sys
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
@@ -125,6 +127,12 @@ def test_what_a_role_asks_for_is_in_its_protocol_and_in_every_implementation_of_
         assert plugins._takes(protocol, method, count), method
     for known in plugins.GROUPS[group]:
         assert plugins._lacks(role, known, plugins.load(group, known)) is None, known
+        assert plugins.declared_settings(group, known) is vars(plugins.load(group, known)).get("Settings"), known
+
+
+def test_listing_settings_imports_nothing_that_runs_a_network() -> None:
+    listed = "import sys, semslam.config; semslam.config.Config().dump(); print('onnx' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", listed], capture_output=True, check=True).stdout.strip() == b"False"
 
 
 def test_names_that_settings_choose_are_checked(install: Install) -> None:

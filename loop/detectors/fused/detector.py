@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from semslam.config import Config, LoopConfig, Section, setting
+from semslam.config import Config, LoopConfig
 from semslam.loop.detector import Arrays
 from semslam.loop.detectors.bag_of_words.detector import make_bag
 from semslam.loop.detectors.bag_of_words.vocabulary import Vocabulary, load_vocabulary
@@ -18,20 +18,13 @@ from semslam.loop.detectors.common.labels import labels_of
 from semslam.loop.detectors.common.remembering import RememberingDetector
 from semslam.loop.detectors.fused.class_index import ClassIndex
 from semslam.loop.detectors.fused.fusion import ClassFeatures, FusionModel, load_fusion, pool_classes
+from semslam.loop.detectors.fused.settings import FusedConfig
 from semslam.loop.detectors.fused.upright import roll_of, turn_image, turn_labels
 from semslam.loop.segmentation.classes import MOVABLE
 from semslam.loop.segmentation.decoding import shrink
 from semslam.types import Float32Array, FloatArray, KeyframeView, LoopCandidate, LoopEvidence
 
 MIDDLE_CHANNELS = 96
-
-
-class FusedConfig(Section):
-    """Which probabilities make a candidate."""
-
-    min_probability: float = setting(0.5, "probability of the same place that makes a candidate", ge=0, le=1)
-    word_share: float = setting(0.4, "share of the candidates chosen by words alone", ge=0, lt=1)
-    min_word_probability: float = setting(0.05, "minimum probability of a candidate chosen by words", ge=0, le=1)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

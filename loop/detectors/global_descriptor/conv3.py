@@ -5,20 +5,15 @@ from typing import Protocol, Self
 
 import numpy as np
 
-from semslam.config import Config, LoopConfig, Section, setting
+from semslam.config import Config, LoopConfig
 from semslam.loop.detectors.common.backbone import Backbone
 from semslam.loop.detectors.common.weight_file import load_min_score
 from semslam.loop.detectors.global_descriptor.descriptor import DescriptorDetector
+from semslam.loop.detectors.global_descriptor.settings import Conv3Config
 from semslam.types import Float32Array, KeyframeView, UInt8Array
 
 SHIPPED = Path(__file__).parents[2] / "weights" / "encoder_map.npz"
 """What was learned of the shipped encoder: the score that makes a candidate."""
-
-
-class Conv3Config(Section):
-    """Which network the features come from."""
-
-    alexnet: Path | None = setting(None, "torchvision's AlexNet weights; none = the shipped encoder")
 
 
 class FeatureMap(Protocol):
