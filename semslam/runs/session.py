@@ -1,6 +1,7 @@
 """A run between its first frame and its result."""
 
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
 from functools import lru_cache, partial
 
 from semslam.config import Config
@@ -43,6 +44,15 @@ from semslam.viewers.viewer import (
 Progress = Callable[[int, FrameState | None], None]
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Tracked:
+    """A frame's place in the sequence, its state where it could be read, and its images where it is a keyframe."""
+
+    index: int
+    state: FrameState | None = None
+    keyframe: Frame | None = None
+
+
 class Session:
     """A run between its first frame and its result."""
 
@@ -73,23 +83,46 @@ class Session:
         self._failure: BaseException | None = None
 
     def track(self) -> Iterator[tuple[int, FrameState | None]]:
-        """Read and track every frame."""
+        """Read and track every frame.
+
+        The first may be tracked while loop closing still starts, but none is handed on before it has started: what
+        cannot be built is known before there is anything of the run.
+        """
         self._looks = True
         self._know_sensor()
-        self._slam.wait_until_ready()  # what cannot be built is known before the first frame
-        for index, item, came in self._frames():
-            if isinstance(item, DatasetError):
-                self._unreadable.append(str(item))
-                yield index, None
-            else:
-                self._checksum = self._checksum or checksum(item)
-                self._latencies.begin(came)
-                state = self._slam.process(item)
-                self._latencies.done(state.keyframe)
-                if self._journal is not None and state.keyframe is not None:
-                    self._journal.keyframe(item, state.motion.observations, self._checksum)
-                self._show(state, item)
-                yield index, state
+        if self._feed is not None:
+            self._slam.wait_until_ready()
+        early: list[_Tracked] = []
+        try:
+            for index, item, came in self._frames():
+                early.append(self._tracked_frame(index, item, came))
+                if self._slam.is_ready:
+                    self._slam.wait_until_ready()
+                    ready, early = early, []
+                    yield from self._handed_on(ready)
+        except FOREIGN:
+            self._slam.wait_until_ready()  # what could not be built is the cause of what failed for want of it
+            yield from self._handed_on(early)
+            raise
+        self._slam.wait_until_ready()
+        yield from self._handed_on(early)
+
+    def _tracked_frame(self, index: int, item: Frame | DatasetError, came: float | None) -> "_Tracked":
+        if isinstance(item, DatasetError):
+            self._unreadable.append(str(item))
+            return _Tracked(index)
+        self._checksum = self._checksum or checksum(item)
+        self._latencies.begin(came)
+        state = self._slam.process(item)
+        self._latencies.done(state.keyframe)
+        self._show(state, item)
+        return _Tracked(index, state, None if state.keyframe is None else item)
+
+    def _handed_on(self, frames: Iterable["_Tracked"]) -> Iterator[tuple[int, FrameState | None]]:
+        for frame in frames:
+            if self._journal is not None and frame.state is not None and frame.keyframe is not None:
+                self._journal.keyframe(frame.keyframe, frame.state.motion.observations, self._checksum)
+            yield frame.index, frame.state
 
     def _know_sensor(self) -> None:
         """Estimate the times of a camera that states none; frames that come by themselves cannot be read ahead."""

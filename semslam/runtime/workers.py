@@ -48,6 +48,11 @@ class Worker(ABC, Generic[Job, Answer]):
     def begin_close(self) -> None:
         """Take no more jobs and begin to end, where that takes time; ``close`` waits for it."""
 
+    @property
+    def is_ready(self) -> bool:
+        """Whether ``wait_until_ready`` would not wait."""
+        return True
+
     def wait_until_ready(self) -> None:
         """Wait until jobs are begun as soon as they are submitted.
 
@@ -122,6 +127,11 @@ class ProcessWorker(Worker[Job, Answer]):
         if self._ending is None:
             self._ending = Thread(target=self._pool.shutdown, name="semslam-ending")
             self._ending.start()
+
+    @property
+    def is_ready(self) -> bool:
+        """See ``Worker``."""
+        return self._prepared.done()
 
     def wait_until_ready(self) -> None:
         """See ``Worker``."""

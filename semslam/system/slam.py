@@ -210,6 +210,11 @@ class Slam:
         if self._queue is not None:
             self._queue.leave()
 
+    @property
+    def is_ready(self) -> bool:
+        """Whether loop closing has started, or has failed to, which ``wait_until_ready`` tells."""
+        return self._closing is None or self._closing.is_ready
+
     def wait_until_ready(self) -> None:
         """Wait until loop closing has started.
 
