@@ -10,6 +10,7 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
+from semslam.frontend.feature_map.links import Link, add_links
 from semslam.geometry.camera import Intrinsics
 from semslam.geometry.reprojection import (
     Measurements,
@@ -37,6 +38,8 @@ class BundleProblem:
         seen: (O,) what was measured.
         camera: the camera.
         gate: weighted squared residual from which a observation counts as an outlier.
+        links: relative poses that are known otherwise, between rows of ``poses``.
+        link_scale: how much their information counts, that of an observation being understated by correlations.
     """
 
     poses: Transforms
@@ -47,6 +50,8 @@ class BundleProblem:
     seen: Measurements
     camera: Intrinsics
     gate: float
+    links: tuple[Link, ...] = ()
+    link_scale: float = 1.0
 
 
 class BundleAdjustment:
@@ -62,7 +67,7 @@ class BundleAdjustment:
         self.points = problem.points.copy()
         self._damping = 1e-4
         self._camera_points, self._residual = self._evaluated(self.poses, self.points)
-        self._cost = self._robust_cost(self._camera_points, self._residual)
+        self._cost = self._robust_cost(self.poses, self._camera_points, self._residual)
 
     def squared_errors(self) -> FloatArray:
         """Weighted squared residuals (O,); infinite behind the camera."""
@@ -75,13 +80,13 @@ class BundleAdjustment:
     def drop_outliers(self) -> None:
         """Leave out the observations that are beyond the gate now from the steps that follow."""
         self._active = ~self.outliers()
-        self._cost = self._robust_cost(self._camera_points, self._residual)
+        self._cost = self._robust_cost(self.poses, self._camera_points, self._residual)
 
     def step(self) -> None:
         """One Levenberg-Marquardt step; poses and points change only if the error falls."""
         poses, points = self._solve()
         camera_points, residual = self._evaluated(poses, points)
-        cost = self._robust_cost(camera_points, residual)
+        cost = self._robust_cost(poses, camera_points, residual)
         if np.isfinite(cost) and cost < self._cost:
             self.poses, self.points, self._cost = poses, points, cost
             self._camera_points, self._residual = camera_points, residual
@@ -97,11 +102,13 @@ class BundleAdjustment:
             camera_points[:, part] = into_camera(T_map_cam, world[part])
         return camera_points, self._problem.seen.stereo - project_stereo(camera_points, self._problem.camera)
 
-    def _robust_cost(self, camera_points: Points3, residual: FloatArray) -> float:
+    def _robust_cost(self, poses: Transforms, camera_points: Points3, residual: FloatArray) -> float:
         gate = self._problem.gate
         errors = gated_errors(residual, self._problem.seen.weights, camera_points[2])
         errors = np.minimum(errors[self._active], 1e6)
-        return float(np.where(errors <= gate, errors, 2.0 * np.sqrt(gate * errors) - gate).sum())
+        linked = sum(link.cost(poses[link.earlier], poses[link.later]) for link in self._problem.links)
+        seen = float(np.where(errors <= gate, errors, 2.0 * np.sqrt(gate * errors) - gate).sum())
+        return seen + self._problem.link_scale * linked
 
     def _solve(self) -> tuple[FloatArray, FloatArray]:
         problem, free, count = self._problem, self._problem.free, len(self.points)
@@ -141,6 +148,7 @@ class BundleAdjustment:
             rows = slice(6 * k, 6 * k + 6)
             H[rows, rows] = weighted @ mine.T
             g[rows] = weighted @ self._residual[:, part].reshape(-1)
+        add_links(self._problem.links, self.poses, free, self._problem.link_scale, H, g)
         diagonal = np.arange(6 * free)
         H[diagonal, diagonal] = H[diagonal, diagonal] * (1.0 + self._damping) + 1e-9
         return H, g

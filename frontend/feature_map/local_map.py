@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from semslam.frontend.feature_map.landmarks import NONE, Landmarks
+from semslam.frontend.feature_map.links import Link
 from semslam.geometry.reprojection import Measurements
 from semslam.geometry.se3 import transform_points
 from semslam.types import Features, IntArray, Transform
@@ -20,6 +21,7 @@ class MapKeyframe:
         features: keypoints.
         measured: the keypoints as measurements.
         map_id: the map it belongs to.
+        link: its pose against an earlier keyframe as images give it, where they do.
     """
 
     id: int
@@ -27,6 +29,7 @@ class MapKeyframe:
     features: Features
     measured: Measurements
     map_id: int
+    link: Link | None = None
 
 
 class LocalMap:

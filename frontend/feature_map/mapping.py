@@ -1,9 +1,12 @@
 """How the feature tracker's map grows, is adjusted and is kept clean."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from semslam.frontend.feature_map.adjustment import BundleAdjustment, BundleProblem
 from semslam.frontend.feature_map.landmarks import NONE
+from semslam.frontend.feature_map.links import ImageChain, Link
 from semslam.frontend.feature_map.local_map import LocalMap, MapKeyframe
 from semslam.frontend.feature_map.map_pose import GATE, View
 from semslam.frontend.feature_map.settings import FeatureMapConfig
@@ -24,13 +27,19 @@ class Mapper:
         self._running: _WindowAdjustment | None = None
 
     def insert(
-        self, view: View, T_map_cam: Transform, landmarks: IntArray, keypoints: IntArray, map_id: int
-    ) -> MapKeyframe:
-        """Make a keyframe of a frame whose keypoints were matched to landmarks; new landmarks come from the rest."""
+        self, view: View, T_map_cam: Transform, landmarks: IntArray, keypoints: IntArray, map_id: int,
+        images: ImageChain,
+    ) -> MapKeyframe:  # fmt: skip
+        """Make a keyframe of a frame whose keypoints were matched to landmarks; new landmarks come from the rest.
+
+        ``images`` is how registered images put it against the keyframe before, and begins anew.
+        """
         self.finish()
         observations = np.full(len(view.features), NONE, dtype=np.int64)
         observations[keypoints] = landmarks
         keyframe = self._map.add_keyframe(T_map_cam, view.features, view.measured, observations, map_id)
+        keyframe.link = images.link(keyframe.id - 1, keyframe.id)
+        images.begin()
         depths = view.features.depths
         fresh = np.flatnonzero((observations == NONE) & (depths > 0) & (depths < self._config.max_depth))
         self._map.add_landmarks(keyframe, fresh)
@@ -65,7 +74,7 @@ class _WindowAdjustment:
 
     def __init__(self, the_map: LocalMap, covisible: IntArray, view: View, config: FeatureMapConfig) -> None:
         self._map = the_map
-        self._steps = config.adjustment_steps
+        self._steps, self._scale = config.adjustment_steps, config.covariance_scale
         self._done = 0
         free = covisible[: config.window]
         landmarks = the_map.seen_from(free)
@@ -106,6 +115,18 @@ class _WindowAdjustment:
             ),
             camera=view.camera,
             gate=GATE,
+            links=self._links(),
+            link_scale=self._scale,
+        )
+
+    def _links(self) -> tuple[Link, ...]:
+        """What images state of the keyframes in the window, by its rows."""
+        row = {int(keyframe): k for k, keyframe in enumerate(self._keyframes)}
+        links = [self._map.keyframes[keyframe].link for keyframe in row]
+        return tuple(
+            replace(link, earlier=row[link.earlier], later=row[link.later])
+            for link in links
+            if link is not None and link.earlier in row
         )
 
     def proceed(self) -> bool:

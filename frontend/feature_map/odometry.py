@@ -7,9 +7,11 @@ import numpy as np
 
 from semslam.config import Config
 from semslam.features import FeatureExtractor
+from semslam.frontend.direct.search import Registered
 from semslam.frontend.feature_map.bridge import Bridge
 from semslam.frontend.feature_map.depth_instant import at_color
 from semslam.frontend.feature_map.landmarks import NONE
+from semslam.frontend.feature_map.links import ImageChain
 from semslam.frontend.feature_map.local_map import LocalMap, MapKeyframe
 from semslam.frontend.feature_map.map_pose import NOTHING, Located, View, combine, locate
 from semslam.frontend.feature_map.mapping import Mapper
@@ -43,7 +45,7 @@ class FeatureMapOdometry:
 
     def __init__(self, config: Config) -> None:
         own = self._config = config.section(FeatureMapOdometry.name, FeatureMapConfig)
-        self._bridge = Bridge()
+        self._bridge, self._chain = Bridge(), ImageChain()
         self._seed = config.seed
         # Fewer and wider levels than the verification's: cheaper, and landmarks are placed better.
         self._scale = own.scale
@@ -123,8 +125,11 @@ class FeatureMapOdometry:
         found = None
         if coarse is not None:
             found = self._locate(view, guess, self._around(coarse.landmarks), self._config.narrow_radius)
-        if found is None or len(found.landmarks) < self._config.image_inliers:
-            found = self._register(frame, raw, T_map_prev, found) or found or self._relocalise(view)
+        images = self._images(frame, T_map_prev, found)
+        self._chain.extend(images)
+        if images is not None:
+            found = self._combined(frame, raw, T_map_prev @ images.T_ref_cam, images)
+        found = found or self._relocalise(view)
         return self._lose(view) if found is None else self._accept(raw, found, T_map_prev)
 
     def _velocity(self, frame: Frame, T_prev_cur: Transform) -> FloatArray:
@@ -163,16 +168,26 @@ class FeatureMapOdometry:
         T_map_cam = match_and_solve(self._map, view, around, self._config.min_inliers, self._seed)
         return None if T_map_cam is None else self._locate(view, T_map_cam, around, radius)
 
-    def _register(self, frame: Frame, raw: Features, T_map_prev: FloatArray, few: Located | None) -> Located | None:
-        """Where images put the frame that has few landmarks, or none; both together, each as far as it is certain."""
+    def _images(self, frame: Frame, T_map_prev: FloatArray, located: Located | None) -> Registered | None:
+        """The motion since the frame before by all pixels of the images, where that is wanted and they match.
+
+        Registration takes a frame to be of one instant. So it helps where a shutter is global, and where landmarks are
+        too few for anything better.
+        """
         if not self._config.image_inliers:
             return None
-        guesses = [] if few is None else [invert(T_map_prev) @ few.T_map_cam]
-        predicted = self._prediction.predict(frame.timestamp)
-        images = self._bridge.register(self._movers.standing(frame), predicted, guesses, self._readout.seconds)
-        if images is None:
+        if (
+            located is not None
+            and len(located.landmarks) >= self._config.image_inliers
+            and self._readout.seconds > self._config.image_readout
+        ):
             return None
-        T_map_cam = T_map_prev @ images.T_ref_cam
+        guesses = [] if located is None else [invert(T_map_prev) @ located.T_map_cam]
+        predicted = self._prediction.predict(frame.timestamp)
+        return self._bridge.register(self._movers.standing(frame), predicted, guesses, self._readout.seconds)
+
+    def _combined(self, frame: Frame, raw: Features, T_map_cam: FloatArray, images: Registered) -> Located:
+        """Where images and landmarks together put the frame, each as far as it is certain."""
         view = self._view(frame, raw, self._velocity(frame, images.T_ref_cam))
         around = self._around(self._tracked)
         landmarks = self._locate(view, T_map_cam, around, self._config.narrow_radius, FEW)
@@ -270,7 +285,7 @@ class FeatureMapOdometry:
         )
 
     def _insert(self, view: View, T_map_cam: Transform, landmarks: IntArray, keypoints: IntArray) -> None:
-        self._reference = self._mapper.insert(view, T_map_cam, landmarks, keypoints, self._map_id)
+        self._reference = self._mapper.insert(view, T_map_cam, landmarks, keypoints, self._map_id, self._chain)
         self._T_ref_prev = np.eye(4)
         self._keyframe_time = view.timestamp
         observations = self._map.observations(self._reference.id)

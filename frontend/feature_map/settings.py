@@ -11,7 +11,10 @@ class FeatureMapConfig(Section):
     min_inliers: int = setting(15, "inlier landmarks that a pose needs", gt=5)
     sure_inliers: int = setting(40, "inlier landmarks below which a pose is degraded", gt=5)
     image_inliers: int = setting(
-        80, "inlier landmarks below which all pixels of the images are registered as well; 0 = never", ge=0
+        80, "inlier landmarks below which a rolling shutter's images are registered as well; 0 = never", ge=0
+    )
+    image_readout: float = setting(
+        0.002, "read-out time up to which the images of every frame are registered", unit="s", ge=0
     )
     min_landmarks: int = setting(50, "keypoints with depth that a map keyframe needs", gt=5)
     restart_seconds: float = setting(
