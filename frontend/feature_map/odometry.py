@@ -179,7 +179,7 @@ class FeatureMapOdometry:
         if (
             located is not None
             and len(located.landmarks) >= self._config.image_inliers
-            and self._readout.seconds > self._config.image_readout
+            and abs(self._readout.seconds) >= self._config.image_readout
         ):
             return None
         guesses = [] if located is None else [invert(T_map_prev) @ located.T_map_cam]

@@ -14,7 +14,7 @@ class FeatureMapConfig(Section):
         80, "inlier landmarks below which a rolling shutter's images are registered as well; 0 = never", ge=0
     )
     image_readout: float = setting(
-        0.002, "read-out time up to which the images of every frame are registered", unit="s", ge=0
+        0.002, "read-out below which every frame's images are registered; 0 = where landmarks are few", unit="s", ge=0
     )
     min_landmarks: int = setting(50, "keypoints with depth that a map keyframe needs", gt=5)
     restart_seconds: float = setting(
