@@ -78,34 +78,30 @@ class Session:
         self._unreadable: list[str] = []
         self._checksum = 0
         self._interrupted = False
+        self._early: list[_Tracked] = []
+        self._early_answers: list[KeyframeAnswer] = []
         self._looks = False  # at the sequence; a replay leaves the images alone, which were looked at when recorded
         self._done = self._tracked = 0
         self._failure: BaseException | None = None
 
     def track(self) -> Iterator[tuple[int, FrameState | None]]:
-        """Read and track every frame.
-
-        The first may be tracked while loop closing still starts, but none is handed on before it has started: what
-        cannot be built is known before there is anything of the run.
-        """
+        """Read and track every frame; none is handed on before loop closing has started, or has failed to."""
         self._looks = True
         self._know_sensor()
         if self._feed is not None:
             self._slam.wait_until_ready()
-        early: list[_Tracked] = []
         try:
             for index, item, came in self._frames():
-                early.append(self._tracked_frame(index, item, came))
+                self._early.append(self._tracked_frame(index, item, came))
                 if self._slam.is_ready:
                     self._slam.wait_until_ready()
-                    ready, early = early, []
-                    yield from self._handed_on(ready)
+                    yield from self._handed_on()
         except FOREIGN:
             self._slam.wait_until_ready()  # what could not be built is the cause of what failed for want of it
-            yield from self._handed_on(early)
+            yield from self._handed_on()
             raise
         self._slam.wait_until_ready()
-        yield from self._handed_on(early)
+        yield from self._handed_on()
 
     def _tracked_frame(self, index: int, item: Frame | DatasetError, came: float | None) -> "_Tracked":
         if isinstance(item, DatasetError):
@@ -118,11 +114,20 @@ class Session:
         self._show(state, item)
         return _Tracked(index, state, None if state.keyframe is None else item)
 
-    def _handed_on(self, frames: Iterable["_Tracked"]) -> Iterator[tuple[int, FrameState | None]]:
+    def _handed_on(self) -> Iterator[tuple[int, FrameState | None]]:
+        """The frames that were held back; then what became of their keyframes is written."""
+        frames, answers = self._early, self._early_answers
+        self._early, self._early_answers = [], []
         for frame in frames:
             if self._journal is not None and frame.state is not None and frame.keyframe is not None:
                 self._journal.keyframe(frame.keyframe, frame.state.motion.observations, self._checksum)
             yield frame.index, frame.state
+        for answer in answers:
+            self._write(answer)
+
+    def _write(self, answer: KeyframeAnswer) -> None:
+        if self._journal is not None:
+            self._journal.outcomes(answer.verifications)
 
     def _know_sensor(self) -> None:
         """Estimate the times of a camera that states none; frames that come by themselves cannot be read ahead."""
@@ -166,8 +171,10 @@ class Session:
         self._clock.note(answer.usage)
         if answer.accepted:
             self._latencies.loop(answer.keyframe)
-        if self._journal is not None:
-            self._journal.outcomes(answer.verifications)
+        if self._early:
+            self._early_answers.append(answer)
+        else:
+            self._write(answer)
         loops = tuple(
             ShownLoop(v.candidate.query, v.candidate.match, isinstance(v, LoopConstraint))
             for v in answer.verifications
