@@ -32,10 +32,13 @@ class Link:
         """Deviation (6,) of two poses (4, 4) from it, in the later one's frame."""
         return tangent(invert(self.T_earlier_later) @ invert(T_earlier) @ T_later)
 
+    def squared(self, error: FloatArray) -> float:
+        """Squared Mahalanobis distance of an error."""
+        return float(error @ self.information @ error)
+
     def cost(self, T_earlier: Transform, T_later: Transform) -> float:
         """Robust squared distance of two poses from it."""
-        off = self.error(T_earlier, T_later)
-        squared = float(off @ self.information @ off)
+        squared = self.squared(self.error(T_earlier, T_later))
         return squared if squared <= GATE else 2.0 * float(np.sqrt(GATE * squared)) - GATE
 
 
@@ -61,7 +64,7 @@ class ImageChain:
 
     def link(self, earlier: int, later: int) -> Link | None:
         """The link from the keyframe where it began to that of the newest frame; None where it was broken."""
-        if self._T is None or earlier == later:
+        if self._T is None:
             return None
         return Link(earlier, later, self._T, np.asarray(np.linalg.inv(self._covariance), dtype=np.float64))
 
@@ -80,8 +83,7 @@ def add_links(links: Sequence[Link], poses: Transforms, free: int, scale: float,
     for link in links:
         T_earlier, T_later = poses[link.earlier], poses[link.later]
         off = link.error(T_earlier, T_later)
-        squared = float(off @ link.information @ off)
-        weight = scale * link.information * (1.0 if squared <= GATE else np.sqrt(GATE / squared))
+        weight = scale * link.information * np.sqrt(GATE / max(link.squared(off), GATE))
         parts = [(link.later, np.eye(6)), (link.earlier, -adjoint(invert(T_later) @ T_earlier))]
         moving = [(slice(6 * row, 6 * row + 6), J) for row, J in parts if row < free]
         for rows, J in moving:

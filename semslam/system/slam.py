@@ -212,7 +212,7 @@ class Slam:
 
     @property
     def is_ready(self) -> bool:
-        """Whether loop closing has started, or has failed to, which ``wait_until_ready`` tells."""
+        """Whether loop closing has started or has failed to; ``wait_until_ready`` raises the failure."""
         return self._closing is None or self._closing.is_ready
 
     def wait_until_ready(self) -> None:

@@ -66,14 +66,16 @@ class ExampleSource:
         settings = self._settings
         if self._taught and rng.random() < settings.unlabelled_share:
             chosen = self._taught[int(rng.integers(len(self._taught)))]
-            seen = random_view(chosen.color, chosen.cells, self._size, rng, settings.strong_share, chosen.depth)
+            depth = chosen.depth if settings.depth else None
+            seen = random_view(chosen.color, chosen.cells, self._size, rng, settings.strong_share, depth)
             beliefs = chosen.beliefs[seen.labels[UNDER_ANSWERS]].astype(np.float32) / np.float32(255.0)
             return Example(seen.color, beliefs, self._picture(seen.depth, rng))
         pool = self.photos
         if rng.random() < settings.rare_share:
             pool = self._by_class[int(rng.integers(len(self._by_class)))]
         photo = pool[int(rng.integers(len(pool)))]
-        view = random_view(photo.color, photo.labels, self._size, rng, settings.strong_share, photo.depth)
+        depth = photo.depth if settings.depth else None
+        view = random_view(photo.color, photo.labels, self._size, rng, settings.strong_share, depth)
         target = self._target_of_label[view.labels[UNDER_ANSWERS]]
         return Example(view.color, target, self._picture(view.depth, rng))
 
