@@ -21,6 +21,14 @@ from semslam.types import FloatArray, IntArray, RejectionReason
 
 NEAR = 5
 """Keyframes that count as the same place, in time."""
+REACH = 10
+"""Keyframes within which, on either pass, loops are of one hypothesis: that the second pass is along the first."""
+APART = 1.0
+"""Metres between two places: nearer ones are in one view, and what parts them is a slip of odometry."""
+TURNED = 0.5
+"""Radians; the same of headings."""
+DOUBT = 3.263
+"""Mahalanobis distance below which nine in ten true loops lie (6 degrees of freedom)."""
 CLEARLY = 3
 """How many times as many loops a group needs to outweigh another one."""
 NEARER = 1.5
@@ -35,6 +43,8 @@ UNIT = 1.0
 """Mahalanobis distances below this are all alike."""
 LINEAR = 0.5
 """Radians: beyond this deviation of heading (root of the sum over three axes) odometry contradicts no loop."""
+LOST = 1.0
+"""Radians: beyond this one odometry does not know where the other end lies, and casts no doubt on a loop either."""
 BLOCK = 50_000
 """Pairs that are worked on at a time."""
 
@@ -74,52 +84,70 @@ def screen_loops(
     """
     if not loops:
         return Screening(np.zeros(0), ())
-    distances, joined, linear = distances_from_odometry(chain, loops)
-    contradicted = (distances > slack * max_residual) & linear
+    drift = _drift(chain, loops)
+    contradicted = (drift.distances > slack * max_residual) & (drift.headings < LINEAR)
     reasons: list[RejectionReason | None] = [RejectionReason.INCONSISTENT if no else None for no in contradicted]
-    plausible = np.flatnonzero(joined & ~contradicted)
-    ambiguous = _ambiguous(chain, [loops[i] for i in plausible.tolist()], distances[plausible], max_residual)
+    plausible = np.flatnonzero(drift.joined & ~contradicted)
+    chosen = [loops[i] for i in plausible.tolist()]
+    ambiguous = _ambiguous(chain, chosen, drift.of(plausible))
     for index in plausible[ambiguous]:
         reasons[index] = RejectionReason.AMBIGUOUS
     for index in np.flatnonzero(unsupported(chain, loops, max_residual, support)):
         reasons[index] = RejectionReason.UNSUPPORTED
-    return Screening(distances, tuple(reasons))
+    return Screening(drift.distances, tuple(reasons))
 
 
-def distances_from_odometry(chain: OdometryChain, loops: Sequence[Edge]) -> tuple[FloatArray, BoolArray, BoolArray]:
-    """Mahalanobis distances between loops and odometry alone.
+@dataclass(frozen=True, slots=True, eq=False)
+class _Drift:
+    """What separates loops from odometry alone.
 
-    Returns:
-        (L,) distances, 0 where odometry does not join the ends; (L,) whether it does; (L,) whether its heading is known
-        well enough for a covariance to first order to describe where the other end may lie.
+    Attributes:
+        distances: (L,) Mahalanobis distances, 0 where odometry does not join the ends.
+        shifts: (L, 6) the same as rotation vectors and translations.
+        joined: (L,) whether odometry joins the ends.
+        headings: (L,) standard deviation of odometry's heading between the ends, radians.
     """
+
+    distances: FloatArray
+    shifts: FloatArray
+    joined: BoolArray
+    headings: FloatArray
+
+    def of(self, rows: IntArray) -> "_Drift":
+        """The same of some loops."""
+        return _Drift(self.distances[rows], self.shifts[rows], self.joined[rows], self.headings[rows])
+
+
+def _drift(chain: OdometryChain, loops: Sequence[Edge]) -> _Drift:
     T, covariance, joined = chain.relative([e.from_key for e in loops], [e.to_key for e in loops])
-    left = deviations(invert(np.stack([loop.T_from_to for loop in loops])) @ T)
+    shifts = deviations(invert(np.stack([loop.T_from_to for loop in loops])) @ T)
     own = np.stack([loop.covariance for loop in loops])
     distances = np.zeros(len(loops))
-    distances[joined] = np.sqrt(squared_mahalanobis(left[joined], (own + covariance)[joined]))
-    linear = np.trace(covariance[:, :3, :3], axis1=1, axis2=2) < LINEAR**2
-    return distances, joined, linear
+    distances[joined] = np.sqrt(squared_mahalanobis(shifts[joined], (own + covariance)[joined]))
+    headings = np.sqrt(np.maximum(np.trace(covariance[:, :3, :3], axis1=1, axis2=2), 0.0))
+    return _Drift(distances, shifts, joined, headings)
 
 
-def _ambiguous(chain: OdometryChain, loops: Sequence[Edge], distances: FloatArray, limit: float) -> BoolArray:
-    """(L,) loops of groups that another group contradicts and does not clearly lose to."""
-    withheld = np.zeros(len(loops), dtype=bool)
-    first, second, both = _sharing_a_place(loops)
-    if not len(first):
-        return withheld
-    off = _openness(chain, loops, first, second)
-    closing = both & (off <= limit)
+def _ambiguous(chain: OdometryChain, loops: Sequence[Edge], drift: _Drift) -> BoolArray:
+    """(L,) loops of groups that odometry leaves in doubt, or that another group contradicts and does not lose to."""
+    pairs = _pairs(loops)
+    off = _openness(chain, loops, pairs.first, pairs.second)
+    closing = pairs.along & (off <= DOUBT)
+    joined = zip(pairs.first[closing].tolist(), pairs.second[closing].tolist(), strict=True)
+    members = [list(component) for component in connected(range(len(loops)), joined)]
     group = np.zeros(len(loops), dtype=np.int64)
-    members = connected(range(len(loops)), zip(first[closing].tolist(), second[closing].tolist(), strict=True))
     for number, component in enumerate(members):
-        group[list(component)] = number
+        group[component] = number
     size = [len(component) for component in members]
-    typical = [max(float(np.median(distances[list(component)])), UNIT) for component in members]
+    typical = [max(float(np.median(drift.distances[component])), UNIT) for component in members]
+    known = _is_apart(drift.shifts) & (drift.headings < LOST)
+    doubtful = [typical[g] > DOUBT and bool(np.median(known[component])) for g, component in enumerate(members)]
+    withheld = np.array(doubtful, dtype=bool)[group]
+    first, second, off = pairs.first[pairs.meeting], pairs.second[pairs.meeting], off[pairs.meeting]
     a, b = np.minimum(group[first], group[second]), np.maximum(group[first], group[second])
     for g, h in np.unique(np.column_stack([a, b])[a != b], axis=0).tolist():
         shared = (a == g) & (b == h)
-        if np.median(off[shared]) <= (limit if shared.sum() > 1 else ALONE * limit):
+        if np.median(off[shared]) <= (DOUBT if shared.sum() > 1 else ALONE * DOUBT):
             continue
         stands = [_outweighs(size[m], typical[m], size[o], typical[o]) for m, o in ((g, h), (h, g))]
         for mine, its in zip((g, h), stands, strict=True):
@@ -131,15 +159,24 @@ def _ambiguous(chain: OdometryChain, loops: Sequence[Edge], distances: FloatArra
 
 
 def _openness(chain: OdometryChain, loops: Sequence[Edge], first: IntArray, second: IntArray) -> FloatArray:
-    """Mahalanobis distance (P,) that the cycle through each pair of loops is from closing; 0 where there is none."""
+    """Mahalanobis distance (P,) that the cycle through each pair of loops is from closing.
+
+    0 where there is no cycle, and where what is left of it does not make two places of one.
+    """
     off = np.zeros(len(first))
     for begin in range(0, len(first), BLOCK):
         block = slice(begin, begin + BLOCK)
         cycle = cycles(chain, loops, first[block], second[block])
-        joined = cycle.joined
-        covariances = (cycle.loops + cycle.odometry)[joined]
-        off[block][joined] = np.sqrt(squared_mahalanobis(cycle.errors[joined], covariances))
+        open_ = cycle.joined & _is_apart(cycle.errors)
+        covariances = (cycle.loops + cycle.odometry)[open_]
+        off[block][open_] = np.sqrt(squared_mahalanobis(cycle.errors[open_], covariances))
     return off
+
+
+def _is_apart(deviations: FloatArray) -> BoolArray:
+    """(L,) whether deviations (L, 6) are between two places, and not a slip of odometry within one."""
+    turned = np.linalg.norm(deviations[:, :3], axis=1) > TURNED
+    return np.asarray(turned | (np.linalg.norm(deviations[:, 3:], axis=1) > APART))
 
 
 def _third_side(loops: Sequence[Edge], first: IntArray, second: IntArray) -> BoolArray:
@@ -171,18 +208,39 @@ def _is_nearer(distance: float, other_distance: float) -> bool:
     return NEARER * distance <= other_distance and other_distance**2 - distance**2 >= STRONG
 
 
-def _sharing_a_place(loops: Sequence[Edge]) -> tuple[IntArray, IntArray, BoolArray]:
-    """Index pairs of loops of which at least one end lies near the other's, and whether both do."""
+@dataclass(frozen=True, slots=True, eq=False)
+class _Pairs:
+    """Pairs of loops that bear on one another.
+
+    Attributes:
+        first, second: (P,) indices of the loops.
+        meeting: (P,) whether they have a view in common, at one end at the least.
+        along: (P,) whether the one follows the other on both passes.
+    """
+
+    first: IntArray
+    second: IntArray
+    meeting: BoolArray
+    along: BoolArray
+
+
+def _pairs(loops: Sequence[Edge]) -> _Pairs:
     queries = np.array([loop.to_key for loop in loops], dtype=np.int64)
     matches = np.array([loop.from_key for loop in loops], dtype=np.int64)
-    first, second = np.unique(np.concatenate([_close(queries), _close(matches)]), axis=0).T
-    both = (np.abs(queries[first] - queries[second]) <= NEAR) & (np.abs(matches[first] - matches[second]) <= NEAR)
-    return first, second, both
+    near = np.unique(np.concatenate([_close(queries, REACH), _close(matches, NEAR)]), axis=0)
+    first, second = near.T
+    by_query, by_match = np.abs(queries[first] - queries[second]), np.abs(matches[first] - matches[second])
+    meeting = (by_query <= NEAR) | (by_match <= NEAR)
+    along = (by_query <= REACH) & (by_match <= REACH)
+    kept = meeting | along
+    return _Pairs(first[kept], second[kept], meeting[kept], along[kept])
 
 
-def _close(keys: IntArray) -> IntArray:
-    """Index pairs (P, 2), ascending, whose keys differ by at most ``NEAR``."""
+def _close(keys: IntArray, reach: int) -> IntArray:
+    """Index pairs (P, 2), ascending, whose keys differ by at most ``reach``."""
     order = np.argsort(keys, kind="stable")
-    ends = np.searchsorted(keys[order], keys[order] + NEAR, side="right")
-    pairs = [(order[i], order[j]) for i, end in enumerate(ends) for j in range(i + 1, end)]
-    return np.sort(np.array(pairs, dtype=np.int64).reshape(-1, 2), axis=1)
+    places = np.arange(len(keys))
+    counts = np.searchsorted(keys[order], keys[order] + reach, side="right") - places - 1
+    first = np.repeat(places, counts)
+    second = first + 1 + np.arange(len(first)) - np.repeat(np.cumsum(counts) - counts, counts)
+    return np.sort(np.column_stack([order[first], order[second]]), axis=1)
