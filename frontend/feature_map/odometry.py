@@ -7,8 +7,8 @@ import numpy as np
 
 from semslam.config import Config
 from semslam.features import FeatureExtractor
+from semslam.frontend.direct.bridge import Bridge
 from semslam.frontend.direct.search import Registered
-from semslam.frontend.feature_map.bridge import Bridge
 from semslam.frontend.feature_map.depth_instant import at_color
 from semslam.frontend.feature_map.landmarks import NONE
 from semslam.frontend.feature_map.links import ImageChain
