@@ -1,16 +1,23 @@
 """Geometric odometry: KISS-ICP (Vizzo et al., RA-L 2023) on the back-projected depth image."""
 
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 
 from semslam.config import Config, Section, setting
+from semslam.frontend.direct.bridge import Bridge
+from semslam.frontend.direct.search import Registered
 from semslam.frontend.prediction import ConstantVelocity, RecentVelocity, check_frame, first_motion
-from semslam.geometry.se3 import invert, is_rigid, rotation_angle
+from semslam.frontend.voxel_map import Scan, VoxelMap
+from semslam.geometry.reprojection import retract
+from semslam.geometry.se3 import invert, is_rigid, orthonormalise, rotation_angle, tangent
+from semslam.runtime.threads import one_blas_thread
 from semslam.types import FloatArray, Frame, Motion, Points3, TrackingStatus, Transform
 
 ALONG_SURFACE = 0.03
 """A point's information along its surface as a share of that across it: small, but edges constrain a little."""
+CONTRADICTION = 22.5
+"""Chi-square of six degrees of freedom at 99.9 %."""
 NEIGHBOURS = 12
 """Neighbouring points from which a surface's normal is computed."""
 
@@ -29,7 +36,11 @@ class KissConfig(Section):
 
 
 class KissOdometry:
-    """Point-to-point ICP against a local voxel map, with a preset for depth cameras. Blind to colour."""
+    """KISS-ICP against a local voxel map, from where the depth image before puts the camera. Blind to colour.
+
+    Points slide along surfaces when they are associated with the nearest ones, and slowly find back. So the depth image
+    is registered to the one before as well, along its normals, and both make one estimate.
+    """
 
     name = "kiss"
     reads: tuple[str, ...] = ("kiss",)
@@ -37,7 +48,9 @@ class KissOdometry:
 
     def __init__(self, config: KissConfig) -> None:
         self._config = config
-        self._icp = _make_icp(config)
+        self._bridge = Bridge(with_color=False)
+        self._map = self._new_map()
+        self._T_map_prev: FloatArray = np.eye(4)
         self._prediction = ConstantVelocity()
         self._recent = RecentVelocity()
         self._started = False
@@ -50,54 +63,82 @@ class KissOdometry:
         return cls(config.section(cls.name, cls.Settings))
 
     def track(self, frame: Frame) -> Motion:
-        """Motion since the previous frame; LOST where there is too little depth or the scan does not match the map.
+        """Motion since the previous frame; LOST where depth matches neither the map nor the image before.
 
         Raises:
             DatasetError: the frame's size does not fit its intrinsics.
         """
         check_frame(frame)
+        with one_blas_thread():
+            return self._track(frame)
+
+    def _track(self, frame: Frame) -> Motion:
+        scan = self._scan(frame)
+        if not self._started:
+            self._started = True
+            self._prediction.tracked(frame.timestamp, np.eye(4))
+            self._remember(frame, scan, first_motion())
+            return first_motion()
+        predicted = self._prediction.predict(frame.timestamp)
+        registered = self._bridge.register(frame, predicted, (), frame.intrinsics.readout or 0.0)
+        T_prev_cur = predicted if registered is None else registered.T_ref_cam
+        located = None if scan is None else self._locate(frame.timestamp, scan, T_prev_cur)
+        found = _one_estimate(registered, located)
+        if found is None:
+            return self._lose(frame.timestamp, scan)
+        return self._accept(frame, scan, found)
+
+    def _new_map(self) -> VoxelMap:
+        return VoxelMap(self._config.voxel, self._config.max_range, self._config.threshold)
+
+    def _scan(self, frame: Frame) -> Scan | None:
+        """The frame's points; None where there are too few."""
         points = frame.intrinsics.back_project(frame.depth, step=self._config.stride).astype(np.float64)
         points = points[points[:, 2] <= self._config.max_range]
-        T_prev_cur = self._prediction.predict(frame.timestamp)
-        self._icp.last_delta = T_prev_cur
-        T_odom_prev = self._icp.last_pose
-        if len(points) >= self._config.min_points:
-            _, source = self._icp.register_frame(points, np.zeros(0))
-            moved = invert(T_odom_prev) @ self._icp.last_pose
-            if not self._started or self._is_plausible(moved, T_prev_cur):
-                return self._accept(frame.timestamp, moved, source)
-        return self._lose(frame.timestamp, T_odom_prev, points)
+        return self._map.scan(points) if len(points) >= self._config.min_points else None
 
-    def _accept(self, timestamp: float, moved: FloatArray, source: FloatArray) -> Motion:
-        self._prediction.tracked(timestamp, moved if self._started else np.eye(4))
-        if not self._started:
-            self._started = True
-            return first_motion()
+    def _locate(self, timestamp: float, scan: Scan, guess: Transform) -> Registered | None:
+        """The motion by the map, or None where that is far from the guess."""
+        if self._map.is_empty:
+            return None
+        moved = invert(self._T_map_prev) @ self._map.locate(scan, self._T_map_prev @ guess)
+        if not self._is_plausible(moved, guess):
+            return None
+        covariance = self._covariance(scan.source, self._recent.departure(timestamp, moved))
+        return Registered(moved, np.asarray(np.linalg.inv(covariance), dtype=np.float64))
+
+    def _accept(self, frame: Frame, scan: Scan | None, found: Registered) -> Motion:
+        self._prediction.tracked(frame.timestamp, found.T_ref_cam)
         status = TrackingStatus.OK if self._lost_since is None else TrackingStatus.RELOCALISED
         self._lost_since = None
-        departure = self._recent.departure(timestamp, moved)
-        return Motion(moved, self._covariance(source, departure), status, self._map_id, len(source))
-
-    def _lose(self, timestamp: float, T_odom_prev: Transform, points: Points3) -> Motion:
-        if not self._started:
-            self._started = True
-            self._prediction.tracked(timestamp, np.eye(4))
-            return first_motion()
-        self._lost_since = timestamp if self._lost_since is None else self._lost_since
-        self._recent = RecentVelocity()
-        # A scan that does not match the map has been written into it, so the map starts anew.
-        if len(points) >= self._config.min_points:
-            self._icp = _make_icp(self._config)
-            self._icp.last_pose = T_odom_prev
-            self._map_id += 1
-        motion = self._prediction.lost(timestamp, self._map_id)
-        self._icp.last_pose = T_odom_prev @ motion.T_prev_cur
+        covariance = np.asarray(np.linalg.inv(found.information), dtype=np.float64)
+        motion = Motion(found.T_ref_cam, covariance, status, self._map_id, 0 if scan is None else len(scan.source))
+        self._remember(frame, scan, motion)
         return motion
 
-    def _is_plausible(self, moved: FloatArray, predicted: FloatArray) -> bool:
+    def _remember(self, frame: Frame, scan: Scan | None, motion: Motion) -> None:
+        self._T_map_prev = orthonormalise(self._T_map_prev @ motion.T_prev_cur)
+        if scan is not None:
+            self._map.add(scan, self._T_map_prev)
+        self._bridge.tracked(frame, motion.covariance)
+
+    def _lose(self, timestamp: float, scan: Scan | None) -> Motion:
+        self._lost_since = timestamp if self._lost_since is None else self._lost_since
+        self._recent = RecentVelocity()
+        if scan is not None and not self._map.is_empty:
+            self._map_id += 1
+        motion = self._prediction.lost(timestamp, self._map_id)
+        self._T_map_prev = orthonormalise(self._T_map_prev @ motion.T_prev_cur)
+        if scan is not None:
+            self._map = self._new_map()
+            self._map.add(scan, self._T_map_prev)
+        self._bridge.lost(motion.T_prev_cur)
+        return motion
+
+    def _is_plausible(self, moved: FloatArray, guess: FloatArray) -> bool:
         if not is_rigid(moved):
             return False
-        surprise = invert(predicted) @ moved
+        surprise = invert(guess) @ moved
         return bool(
             np.linalg.norm(surprise[:3, 3]) <= self._config.max_surprise
             and rotation_angle(surprise) <= self._config.max_surprise_rotation
@@ -120,6 +161,19 @@ class KissOdometry:
         return registration + np.outer(departure, departure)
 
 
+def _one_estimate(registered: Registered | None, located: Registered | None) -> Registered | None:
+    """Both motions by their information; the first alone where they contradict each other."""
+    if registered is None or located is None:
+        return registered or located
+    difference = tangent(invert(registered.T_ref_cam) @ located.T_ref_cam)
+    together = np.linalg.inv(registered.information) + np.linalg.inv(located.information)
+    if difference @ np.linalg.solve(together, difference) > CONTRADICTION:
+        return registered
+    information = registered.information + located.information
+    step = np.asarray(np.linalg.solve(information, located.information @ difference), dtype=np.float64)
+    return Registered(orthonormalise(retract(registered.T_ref_cam, step)), information)
+
+
 def _normals(points: Points3) -> FloatArray:
     """Unit normals (N, 3) of the surface that points (N, 3) lie on."""
     import open3d as o3d
@@ -127,16 +181,3 @@ def _normals(points: Points3) -> FloatArray:
     cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
     cloud.estimate_normals(o3d.geometry.KDTreeSearchParamKNN(NEIGHBOURS))
     return np.asarray(cloud.normals, dtype=np.float64)
-
-
-def _make_icp(config: KissConfig) -> Any:
-    from kiss_icp.config.parser import KISSConfig
-    from kiss_icp.kiss_icp import KissICP
-
-    settings = KISSConfig()
-    settings.data.max_range = config.max_range
-    settings.data.deskew = False
-    settings.mapping.voxel_size = config.voxel
-    settings.adaptive_threshold.fixed_threshold = config.threshold
-    settings.registration.max_num_threads = 1
-    return KissICP(settings)

@@ -26,9 +26,14 @@ MAX_GAP = 0.5
 
 
 class Bridge:
-    """The last tracked frame, how it moved, and registration to it."""
+    """The last tracked frame, how it moved, and registration to it.
 
-    def __init__(self) -> None:
+    Args:
+        with_color: False = by depth alone.
+    """
+
+    def __init__(self, with_color: bool = True) -> None:
+        self._with_color = with_color
         self._frame: Frame | None = None
         self._levels: tuple[Level, ...] | None = None
         self._levels_of: Frame | None = None
@@ -61,9 +66,11 @@ class Bridge:
             readout: seconds from colour's first row to its last.
         """
         tracked = self._frame
-        if tracked is None or frame.timestamp - tracked.timestamp > MAX_GAP or frame.color.std() < MIN_CONTRAST:
+        if tracked is None or frame.timestamp - tracked.timestamp > MAX_GAP:
             return None
-        reference, current = self._levels_for(tracked), make_levels(frame)
+        if self._with_color and frame.color.std() < MIN_CONTRAST:
+            return None
+        reference, current = self._levels_for(tracked), make_levels(frame, self._with_color)
         if reference is None or current is None:
             return None
         seconds = max(frame.timestamp - tracked.timestamp, SHORTEST)
@@ -87,7 +94,7 @@ class Bridge:
         return self._velocity_covariance * seconds**2 + np.diag(change**2)
 
     def _levels_for(self, frame: Frame) -> tuple[Level, ...] | None:
-        return self._levels if self._levels_of is frame else make_levels(frame)
+        return self._levels if self._levels_of is frame else make_levels(frame, self._with_color)
 
 
 def _inverse(matrix: FloatArray) -> FloatArray:

@@ -43,11 +43,15 @@ class Level:
     brightness: FloatArray
 
 
-def make_levels(frame: Frame) -> tuple[Level, ...] | None:
-    """The images of a frame, coarsest first; None where it is tiny or has hardly any depth."""
+def make_levels(frame: Frame, with_color: bool = True) -> tuple[Level, ...] | None:
+    """The images of a frame, coarsest first; None where it is tiny or has hardly any depth.
+
+    Args:
+        frame: the frame.
+        with_color: False = of even brightness, which states nothing of a pose.
+    """
     camera = frame.intrinsics
-    color = camera.undistort_image(frame.color, cv2.INTER_LINEAR)
-    gray = np.asarray(cv2.cvtColor(color, cv2.COLOR_RGB2GRAY), dtype=np.float32)
+    gray = _gray(frame) if with_color else np.zeros(frame.depth.shape, np.float32)
     depth = camera.undistort_image(frame.depth, cv2.INTER_NEAREST)
     seen = (depth > 0) & (depth <= MAX_DEPTH)
     if np.count_nonzero(seen) < MIN_COVERAGE * seen.size:
@@ -55,6 +59,11 @@ def make_levels(frame: Frame) -> tuple[Level, ...] | None:
     inverse = np.where(seen, 1.0 / np.where(seen, depth, 1.0), 0.0).astype(np.float32)
     levels = tuple(_level(gray, inverse, seen, camera, width) for width in WIDTHS)
     return levels if min(len(level.points) for level in levels) >= MIN_POINTS else None
+
+
+def _gray(frame: Frame) -> Float32Array:
+    color = frame.intrinsics.undistort_image(frame.color, cv2.INTER_LINEAR)
+    return np.asarray(cv2.cvtColor(color, cv2.COLOR_RGB2GRAY), dtype=np.float32)
 
 
 def _level(

@@ -1,11 +1,15 @@
 """The uncertainty of depth-only odometry: a wall does not hold a scan in place, and a slip betrays itself."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
-from semslam.frontend.kiss import KissConfig, KissOdometry
+from semslam.frontend.direct.search import Registered
+from semslam.frontend.kiss import KissConfig, KissOdometry, _one_estimate
 from semslam.frontend.prediction import RecentVelocity
-from semslam.geometry.se3 import exp_so3, make_transform
+from semslam.geometry.se3 import exp_so3, invert, make_transform, tangent
+from semslam.testing.scenes import room
 
 
 def plane(normal_axis, offset, rng, count=600):
@@ -64,3 +68,33 @@ def test_what_is_long_past_does_not_count():
     recent.departure(0.0, move(0.0))
     recent.departure(0.1, move(0.05))
     assert recent.departure(5.0, move(0.9)) == pytest.approx(np.zeros(6))
+
+
+def stated(x, sigma):
+    return Registered(move(x), np.eye(6) / sigma**2)
+
+
+def test_two_motions_that_agree_count_by_their_information():
+    found = _one_estimate(stated(0.0, 0.01), stated(0.03, 0.02))
+    assert found is not None
+    assert found.T_ref_cam[0, 3] == pytest.approx(0.006)
+    assert np.allclose(np.linalg.inv(found.information), np.eye(6) * 0.8e-4)
+
+
+def test_a_scan_that_slid_does_not_count():
+    registered = stated(0.0, 0.01)
+    assert _one_estimate(registered, stated(0.2, 0.02)) is registered
+    assert _one_estimate(None, registered) is registered
+    assert _one_estimate(registered, None) is registered
+    assert _one_estimate(None, None) is None
+
+
+def test_a_camera_at_ten_hertz_is_followed():
+    """Every third frame: points associated with the nearest ones alone lag behind by half the motion."""
+    clip = room()
+    odometry = KissOdometry(KissConfig())
+    frames = range(0, len(clip.frames), 3)
+    motions = [odometry.track(clip.frames[k]) for k in frames]
+    for (a, b), motion in zip(pairwise(frames), motions[1:], strict=True):
+        error = tangent(invert(motion.T_prev_cur) @ invert(clip.poses[a]) @ clip.poses[b])
+        assert np.linalg.norm(error[3:]) < 0.01
