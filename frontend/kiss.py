@@ -8,6 +8,7 @@ from semslam.config import Config, Section, setting
 from semslam.frontend.direct.bridge import Bridge
 from semslam.frontend.direct.search import Registered
 from semslam.frontend.prediction import ConstantVelocity, RecentVelocity, check_frame, first_motion
+from semslam.frontend.rolling_shutter import depth_readout, rectify_points, velocity_of
 from semslam.frontend.voxel_map import Scan, VoxelMap
 from semslam.geometry.reprojection import retract
 from semslam.geometry.se3 import invert, is_rigid, orthonormalise, rotation_angle, tangent
@@ -73,16 +74,16 @@ class KissOdometry:
             return self._track(frame)
 
     def _track(self, frame: Frame) -> Motion:
-        scan = self._scan(frame)
         if not self._started:
             self._started = True
             self._prediction.tracked(frame.timestamp, np.eye(4))
-            self._remember(frame, scan, first_motion())
+            self._remember(frame, self._scan(frame, np.zeros(6)), first_motion())
             return first_motion()
         predicted = self._prediction.predict(frame.timestamp)
         registered = self._bridge.register(frame, predicted, (), frame.intrinsics.readout or 0.0)
-        T_prev_cur = predicted if registered is None else registered.T_ref_cam
-        located = None if scan is None else self._locate(frame.timestamp, scan, T_prev_cur)
+        guess = predicted if registered is None else registered.T_ref_cam
+        scan = self._scan(frame, velocity_of(guess, self._prediction.seconds_since_last(frame.timestamp)))
+        located = None if scan is None else self._locate(frame.timestamp, scan, guess)
         found = _one_estimate(registered, located)
         if found is None:
             return self._lose(frame.timestamp, scan)
@@ -91,11 +92,14 @@ class KissOdometry:
     def _new_map(self) -> VoxelMap:
         return VoxelMap(self._config.voxel, self._config.max_range, self._config.threshold)
 
-    def _scan(self, frame: Frame) -> Scan | None:
-        """The frame's points; None where there are too few."""
-        points = frame.intrinsics.back_project(frame.depth, step=self._config.stride).astype(np.float64)
+    def _scan(self, frame: Frame, velocity: FloatArray) -> Scan | None:
+        """The frame's points, as a global shutter would see them; None where there are too few."""
+        camera = frame.intrinsics
+        points = camera.back_project(frame.depth, step=self._config.stride).astype(np.float64)
         points = points[points[:, 2] <= self._config.max_range]
-        return self._map.scan(points) if len(points) >= self._config.min_points else None
+        if len(points) < self._config.min_points:
+            return None
+        return self._map.scan(rectify_points(points, camera, velocity, depth_readout(camera)))
 
     def _locate(self, timestamp: float, scan: Scan, guess: Transform) -> Registered | None:
         """The motion by the map, or None where that is far from the guess."""
@@ -120,7 +124,7 @@ class KissOdometry:
         self._T_map_prev = orthonormalise(self._T_map_prev @ motion.T_prev_cur)
         if scan is not None:
             self._map.add(scan, self._T_map_prev)
-        self._bridge.tracked(frame, motion.covariance)
+        self._bridge.tracked(frame, motion.T_prev_cur, motion.covariance)
 
     def _lose(self, timestamp: float, scan: Scan | None) -> Motion:
         self._lost_since = timestamp if self._lost_since is None else self._lost_since

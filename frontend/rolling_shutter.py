@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from semslam.geometry.se3 import tangent
-from semslam.types import Cloud, Features, FloatArray, Frame, Intrinsics, Transform
+from semslam.types import Cloud, Features, FloatArray, Frame, Intrinsics, Points3, Transform
 
 
 def velocity_of(T_prev_cur: Transform, seconds: float) -> FloatArray:
@@ -50,11 +50,23 @@ def rectify_cloud(cloud: Cloud, camera: Intrinsics, velocity: FloatArray, readou
     if readout == 0 or not len(cloud):
         return cloud
     points, normals = cloud.points.astype(np.float64), cloud.normals.astype(np.float64)
-    delay = readout * camera.fy * points[:, 1] / points[:, 2] / camera.height
-    points += delay[:, None] * (np.cross(velocity[:3], points) + velocity[3:])
-    normals += delay[:, None] * np.cross(velocity[:3], normals)
+    normals += _delays(points, camera, readout) * np.cross(velocity[:3], normals)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    points = rectify_points(points, camera, velocity, readout)
     return replace(cloud, points=points.astype(np.float32), normals=normals.astype(np.float32))
+
+
+def rectify_points(points: Points3, camera: Intrinsics, velocity: FloatArray, readout: float) -> Points3:
+    """Move points (N, 3) in front of the camera likewise; arguments as in ``rectify``."""
+    if readout == 0 or not len(points):
+        return points
+    moved = np.cross(velocity[:3], points) + velocity[3:]
+    return np.asarray(points + _delays(points, camera, readout) * moved)
+
+
+def _delays(points: Points3, camera: Intrinsics, readout: float) -> FloatArray:
+    """Seconds (N, 1) by which the rows that see points (N, 3) are read out after the principal point's."""
+    return np.asarray(readout * camera.fy * points[:, 1:2] / points[:, 2:] / camera.height)
 
 
 def still(features: Features, frame: Frame, velocity: FloatArray | None) -> Features:
@@ -67,5 +79,9 @@ def still(features: Features, frame: Frame, velocity: FloatArray | None) -> Feat
 def still_cloud(cloud: Cloud, frame: Frame, velocity: FloatArray | None) -> Cloud:
     """The same of its cloud, whose rows are read out with colour's unless the camera states otherwise."""
     camera = frame.intrinsics
-    readout = camera.readout if camera.depth_readout is None else camera.depth_readout
-    return cloud if velocity is None else rectify_cloud(cloud, camera, velocity, readout or 0.0)
+    return cloud if velocity is None else rectify_cloud(cloud, camera, velocity, depth_readout(camera))
+
+
+def depth_readout(camera: Intrinsics) -> float:
+    """Seconds from depth's first row to its last, as far as the camera states them: 0 where it does not."""
+    return (camera.readout if camera.depth_readout is None else camera.depth_readout) or 0.0

@@ -12,10 +12,11 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from semslam.frontend.direct.clock import Clocks, moved
 from semslam.frontend.direct.view import Level
 from semslam.geometry.reprojection import NEAREST, retract
-from semslam.geometry.se3 import invert, tangent, transform_points
-from semslam.types import FloatArray, Transform
+from semslam.geometry.se3 import Float32Array, invert, tangent, transform_points
+from semslam.types import FloatArray, IntArray, Points3, Transform
 
 STEPS = 12
 FREEDOM = 5.0
@@ -60,39 +61,106 @@ class Equations:
     cost: float
 
 
-def equations(reference: Level, current: Level, T_ref_cam: Transform) -> Equations:
-    """Residuals of a frame's points at a pose, and their derivatives by the pose's right tangent."""
-    camera = reference.camera
-    seen = transform_points(T_ref_cam, current.points)
-    z = np.maximum(seen[:, 2], NEAREST)
-    pixels = np.column_stack([camera.fx * seen[:, 0] / z + camera.cx, camera.fy * seen[:, 1] / z + camera.cy])
-    u, v = pixels.astype(np.float32).T
-    channels = cv2.remap(reference.channels, u, v, cv2.INTER_LINEAR).reshape(-1, 3).astype(np.float64)
-    usable = (channels[:, 2] > 0.99) & (seen[:, 2] > NEAREST)
+def equations(reference: Level, current: Level, T_ref_cam: Transform, clocks: Clocks | None = None) -> Equations:
+    """Residuals of a frame's points at a pose, and their derivatives by the pose's right tangent.
+
+    Args:
+        reference: images of the other frame.
+        current: images of the frame.
+        T_ref_cam: (4, 4).
+        clocks: when the rows of both were seen; None = at once.
+    """
+    depth = color = _sight(reference, current, T_ref_cam, clocks, False)
+    brightness = current.brightness
+    if clocks is not None and not clocks.are_one:
+        color = _sight(reference, current, T_ref_cam, clocks, True)
+        brightness = _brightness(current, T_ref_cam, clocks)
+    usable = depth.usable & color.usable
     rows = np.flatnonzero(usable)
     overlap = len(rows) / max(len(usable), 1)
     if len(rows) < 6:
         return Equations(np.zeros((6, 6)), np.zeros(6), overlap, 0.0, np.inf)
-    slopes = cv2.remap(reference.slopes, u[rows], v[rows], cv2.INTER_LINEAR).reshape(-1, 4).astype(np.float64)
-    channels, seen, points = channels[rows], seen[rows], current.points[rows]
-    inverse = 1.0 / seen[:, 2]
-    agrees = np.abs(channels[:, 1] * seen[:, 2] - 1.0) < AGREES
-    darker = channels[:, 0] - current.brightness[rows]
-    residuals = np.stack([darker - np.median(darker[agrees]) if agrees.any() else darker, channels[:, 1] - inverse])
-    by_point = np.stack(
-        [_by_point(slopes[:, :2], seen, inverse, reference), _by_point(slopes[:, 2:], seen, inverse, reference)]
-    )
+    inverse = 1.0 / depth.points[rows, 2]
+    surface = depth.channels[rows, 1]
+    agrees = np.abs(surface * depth.points[rows, 2] - 1.0) < AGREES
+    darker = color.channels[rows, 0] - brightness[rows]
+    residuals = np.stack([darker - np.median(darker[agrees]) if agrees.any() else darker, surface - inverse])
+    by_point = np.stack([color.by_point(reference, rows, 0), depth.by_point(reference, rows, 2)])
     by_point[1, :, 2] += inverse * inverse
     # An occluded or unknown surface says nothing of brightness either.
     weights = _weights(residuals, agrees)
     turned = by_point @ T_ref_cam[:3, :3]
-    J = np.concatenate([np.cross(points, turned), turned], axis=2)
+    J = np.concatenate([np.cross(current.points[rows], turned), turned], axis=2)
+    if clocks is not None:
+        J *= np.stack([color.parts[rows], depth.parts[rows]])[..., None]
     weighted = J * weights[..., None]
     H = np.einsum("cni,cnj->ij", weighted, J)
     g = -np.einsum("cni,cn->i", weighted, residuals)
     errors = (residuals / LEAST_SIGMAS[:, None]) ** 2
     cost = float(np.log1p(errors / FREEDOM).sum(0).mean())
     return Equations(H / NEIGHBOURS, g / NEIGHBOURS, overlap, float(agrees.mean()), cost)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Sight:
+    """A frame's points in the reference's images.
+
+    Attributes:
+        points: (N, 3) metres, in the reference's camera when the row that sees them was exposed.
+        u, v: (N,) pixels.
+        channels: (N, 3) of the reference's images.
+        usable: (N,) whether they can be interpolated there.
+        parts: (N,) how much of the motion between the frames lies between both rows.
+    """
+
+    points: Points3
+    u: Float32Array
+    v: Float32Array
+    channels: FloatArray
+    usable: npt.NDArray[np.bool_]
+    parts: FloatArray
+
+    def by_point(self, reference: Level, rows: IntArray, first: int) -> FloatArray:
+        """Derivative (R, 3) of a channel, whose slopes are the two from ``first``, by some of the points."""
+        slopes = cv2.remap(reference.slopes, self.u[rows], self.v[rows], cv2.INTER_LINEAR).reshape(-1, 4)
+        points = self.points[rows]
+        return _by_point(slopes[:, first : first + 2].astype(np.float64), points, 1.0 / points[:, 2], reference)
+
+
+def _sight(reference: Level, current: Level, T_ref_cam: Transform, clocks: Clocks | None, by_color: bool) -> _Sight:
+    """Points, each measured when its row of depth was, in the reference's colour or depth."""
+    points, parts = current.points, np.ones(len(current.points))
+    if clocks is not None:
+        motion = tangent(T_ref_cam)
+        clock, began = clocks.color if by_color else clocks.depth, clocks.depth.at(current.rows)
+        points = transform_points(T_ref_cam, moved(points, clocks.at_frame(motion), began))
+        _, v = _projected(reference, points)
+        ends = clock.at((v - reference.camera.cy) / reference.camera.height)
+        points = moved(points, clocks.at_reference(motion), -ends)
+        here, there = clocks.shares
+        parts = 1.0 + here * began - there * ends
+    else:
+        points = transform_points(T_ref_cam, points)
+    u, v = _projected(reference, points)
+    channels = cv2.remap(reference.channels, u, v, cv2.INTER_LINEAR).reshape(-1, 3).astype(np.float64)
+    return _Sight(points, u, v, channels, (channels[:, 2] > 0.99) & (points[:, 2] > NEAREST), parts)
+
+
+def _brightness(current: Level, T_ref_cam: Transform, clocks: Clocks) -> FloatArray:
+    """Brightness (N,) of a frame's points, at the instant of colour where they were measured at that of depth."""
+    since = clocks.depth.at(current.rows) - clocks.color.at(current.rows)
+    u, v = _projected(current, moved(current.points, clocks.at_frame(tangent(T_ref_cam)), since))
+    seen = cv2.remap(current.channels, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    return np.asarray(seen.reshape(-1, 3)[:, 0], dtype=np.float64)
+
+
+def _projected(level: Level, points: Points3) -> tuple[Float32Array, Float32Array]:
+    """Pixels (N,) u and v of points (N, 3)."""
+    z = np.maximum(points[:, 2], NEAREST)
+    camera = level.camera
+    pixels = np.column_stack([camera.fx * points[:, 0] / z + camera.cx, camera.fy * points[:, 1] / z + camera.cy])
+    u, v = pixels.astype(np.float32).T
+    return u, v
 
 
 def _by_point(slopes: FloatArray, seen: FloatArray, inverse: FloatArray, level: Level) -> FloatArray:
@@ -124,17 +192,23 @@ class Alignment:
     belief: Belief
 
 
-def align(reference: tuple[Level, ...], current: tuple[Level, ...], start: Transform, belief: Belief) -> Alignment:
-    """Align a frame to a reference, from a start and with a belief, coarse to fine."""
+def align(
+    reference: tuple[Level, ...],
+    current: tuple[Level, ...],
+    start: Transform,
+    belief: Belief,
+    clocks: Clocks | None = None,
+) -> Alignment:
+    """Align a frame to a reference, from a start and with a belief, coarse to fine; clocks as for ``equations``."""
     T = start
-    found = equations(reference[0], current[0], T)
+    found = equations(reference[0], current[0], T, clocks)
     for theirs, ours in zip(reference, current, strict=True):
         for _ in range(STEPS):
-            found = equations(theirs, ours, T)
+            found = equations(theirs, ours, T, clocks)
             off = tangent(invert(belief.T_ref_cam) @ T)
             gradient = found.gradient - belief.information @ off
             step = np.asarray(np.linalg.solve(found.information + belief.information, gradient), dtype=np.float64)
             T = retract(T, step)
             if np.abs(step).max() < 1e-4:
                 break
-    return Alignment(T, equations(reference[-1], current[-1], T), belief)
+    return Alignment(T, equations(reference[-1], current[-1], T, clocks), belief)

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from semslam.frontend.direct.alignment import Belief
+from semslam.frontend.direct.clock import clocks_of
 from semslam.frontend.direct.search import Registered, register
 from semslam.frontend.direct.view import Level, make_levels
 from semslam.frontend.prediction import wide_covariance
@@ -15,8 +16,8 @@ RESTLESS_ROTATION, RESTLESS_TRANSLATION = 6.0, 2.5
 """Standard deviation of a hand-held camera's acceleration, rad/s² and m/s²."""
 INEXACT = 0.01
 """Share of a motion by which calibration falsifies it."""
-BENT = 0.4
-"""Share of the motion during a read-out: images are registered as if all rows were of one instant."""
+BENT = 0.2
+"""Share of the motion during a read-out by which it is not as even as it is taken to be."""
 MIN_CONTRAST = 4.0
 """Standard deviation of the grey levels of a usable image: a black or a white one is a fault of the camera."""
 SHORTEST = 1e-3
@@ -40,11 +41,14 @@ class Bridge:
         self._velocity_covariance: FloatArray = np.eye(6)
         self._T_tracked_prev: FloatArray = np.eye(4)
         self._is_lost = False
+        self._velocity: FloatArray | None = None
 
-    def tracked(self, frame: Frame, covariance: Covariance6) -> None:
-        """Note a frame that was tracked, with the covariance (6, 6) of its motion since the frame before."""
+    def tracked(self, frame: Frame, T_prev_cur: Transform, covariance: Covariance6) -> None:
+        """Note a frame that was tracked, with its motion (4, 4) since the frame before and the covariance (6, 6)."""
         if self._frame is not None and not self._is_lost:
-            self._velocity_covariance = covariance / max(frame.timestamp - self._frame.timestamp, SHORTEST) ** 2
+            seconds = max(frame.timestamp - self._frame.timestamp, SHORTEST)
+            self._velocity_covariance = covariance / seconds**2
+            self._velocity = tangent(T_prev_cur) / seconds
         self._frame = frame
         self._T_tracked_prev = np.eye(4)
         self._is_lost = False
@@ -52,6 +56,7 @@ class Bridge:
     def lost(self, T_prev_cur: Transform) -> None:
         """Note the predicted motion (4, 4) of a frame that was not."""
         self._T_tracked_prev = self._T_tracked_prev @ T_prev_cur
+        self._velocity = None
         self._is_lost = True
 
     def register(
@@ -77,7 +82,9 @@ class Bridge:
         T_tracked_prev = self._T_tracked_prev
         information = _inverse(self._expected(seconds))
         starts = [T_tracked_prev @ guess for guess in (*guesses, T_prev_cur)]
-        found = register(reference, current, starts, Belief(starts[-1], information))
+        before = None if self._velocity is None else self._velocity * seconds
+        clocks = clocks_of(frame.intrinsics, readout, seconds, before)
+        found = register(reference, current, starts, Belief(starts[-1], information), clocks)
         self._levels, self._levels_of = current, frame
         if found is None:
             return None

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from semslam.frontend.direct.alignment import Alignment, Belief, align
+from semslam.frontend.direct.clock import Clocks
 from semslam.frontend.direct.view import Level
 from semslam.geometry.se3 import exp_so3, make_transform
 from semslam.types import FloatArray, Transform
@@ -35,7 +36,11 @@ class Registered:
 
 
 def register(
-    reference: tuple[Level, ...], current: tuple[Level, ...], starts: list[Transform], belief: Belief
+    reference: tuple[Level, ...],
+    current: tuple[Level, ...],
+    starts: list[Transform],
+    belief: Belief,
+    clocks: Clocks | None = None,
 ) -> Registered | None:
     """Register a frame to another; None where they do not match.
 
@@ -44,15 +49,16 @@ def register(
         current: images of the frame.
         starts: (4, 4) guesses, the likeliest first; turns around the last are tried where none leads to a match.
         belief: what is expected of the pose.
+        clocks: when the rows of both were seen; None = at once.
     """
     for start in starts:
-        found = align(reference, current, start, belief)
+        found = align(reference, current, start, belief, clocks)
         if _matches(found):
             return _registered(found)
     turned = [starts[-1] @ turn for turn in _turns()]
-    coarse = [align(reference[:1], current[:1], start, belief) for start in turned]
+    coarse = [align(reference[:1], current[:1], start, belief, clocks) for start in turned]
     best = min(coarse, key=lambda each: each.images.cost if each.images.overlap >= MIN_OVERLAP else np.inf)
-    found = align(reference, current, best.T_ref_cam, belief)
+    found = align(reference, current, best.T_ref_cam, belief, clocks)
     return _registered(found) if _matches(found) else None
 
 

@@ -33,6 +33,7 @@ class Level:
         channels: (H, W, 3) brightness, inverse depth (1 / m), and whether they can be interpolated, 0 or 1.
         slopes: (H, W, 4) derivatives by u and v of brightness, then of inverse depth.
         points: (N, 3) metres, of the pixels that lie within a surface.
+        rows: (N,) of the same pixels, from the principal point's in heights of the image.
         brightness: (N,) of the same pixels.
     """
 
@@ -40,6 +41,7 @@ class Level:
     channels: Float32Array
     slopes: Float32Array
     points: Points3
+    rows: FloatArray
     brightness: FloatArray
 
 
@@ -96,4 +98,5 @@ def _level(
     z = 1.0 / surface[v, u].astype(np.float64)
     points = np.column_stack([(u - small.cx) / small.fx * z, (v - small.cy) / small.fy * z, z])
     channels = np.dstack([brightness, surface, inner.astype(np.float32)])
-    return Level(small, channels, np.dstack(slopes), points, brightness[v, u].astype(np.float64))
+    rows = (v - small.cy) / small.height
+    return Level(small, channels, np.dstack(slopes), points, rows, brightness[v, u].astype(np.float64))

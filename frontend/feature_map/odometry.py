@@ -95,7 +95,7 @@ class FeatureMapOdometry:
         if motion.status is TrackingStatus.LOST:
             self._bridge.lost(motion.T_prev_cur)
         else:
-            self._bridge.tracked(self._movers.standing(frame), motion.covariance)
+            self._bridge.tracked(self._movers.standing(frame), motion.T_prev_cur, motion.covariance)
             self._movers.remember(frame, self._T_reported, self._map_id)
         return motion
 
