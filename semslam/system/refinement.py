@@ -24,7 +24,7 @@ def refine(
 
     The landmarks are those that the odometry keeps. One that keeps none, such as ICP, gets them from its closures:
     the features on which the accepted loops rest, and those that a keyframe shares with the one before it. Without
-    an accepted loop its poses stay as they are.
+    an accepted loop the poses stay as they are: odometry has adjusted its own map already.
 
     Args:
         solution: the optimised graph.
@@ -36,8 +36,10 @@ def refine(
         GraphError: the optimiser failed.
     """
     settings = config.backend.bundle
+    if not (settings.rounds and solution.loops):
+        return solution
     if not observations:
-        if not (settings.rounds and settings.closures and solution.loops):
+        if not settings.closures:
             return solution
         observations = _shared(solution, keyframes, config)
         settings = settings.model_copy(update=SEEN_TWICE)
