@@ -7,7 +7,7 @@ import numpy as np
 from semslam.frontend.direct.alignment import Belief
 from semslam.frontend.direct.clock import clocks_of
 from semslam.frontend.direct.search import Registered, register
-from semslam.frontend.direct.view import Level, make_levels
+from semslam.frontend.direct.view import MIN_CONTRAST, Level, make_levels
 from semslam.frontend.prediction import wide_covariance
 from semslam.geometry.se3 import invert, tangent
 from semslam.types import Covariance6, FloatArray, Frame, Transform
@@ -18,8 +18,6 @@ INEXACT = 0.01
 """Share of a motion by which calibration falsifies it."""
 BENT = 0.2
 """Share of the motion during a read-out by which it is not as even as it is taken to be."""
-MIN_CONTRAST = 4.0
-"""Standard deviation of the grey levels of a usable image: a black or a white one is a fault of the camera."""
 SHORTEST = 1e-3
 """Seconds between two frames, at the least: stamps may be given twice."""
 MAX_GAP = 0.5

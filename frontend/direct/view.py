@@ -18,6 +18,8 @@ MAX_DEPTH = 6.0
 """Metres; what is farther is too noisy to help."""
 EDGE = 0.1
 """Share of the inverse depth by which neighbours differ across an edge, where nothing may be interpolated."""
+MIN_CONTRAST = 4.0
+"""Standard deviation of the grey levels of a usable image: a black or a white one is a fault of the camera."""
 MIN_COVERAGE = 0.05
 """Share of pixels that must have depth."""
 MIN_POINTS = 100

@@ -7,9 +7,8 @@ import cv2
 import numpy as np
 
 from semslam.config import Config, Section, setting
-from semslam.frontend.direct.alignment import Belief
-from semslam.frontend.direct.search import register
 from semslam.frontend.direct.view import Level, make_levels
+from semslam.frontend.frame_to_frame.images import registered
 from semslam.frontend.frame_to_frame.reference import ReferenceOdometry, Registration
 from semslam.geometry.camera import Intrinsics
 from semslam.geometry.se3 import adjoint, invert, is_rigid
@@ -20,8 +19,6 @@ MIN_SIZE = 32
 """Pixels; smaller images have no pyramid."""
 MEET = 0.05
 """Metres within which two depths are of one surface."""
-GUESS = np.eye(6) / 0.1**2
-"""Information of a guess: a tenth of a radian and of a metre."""
 
 
 class DenseConfig(Section):
@@ -85,10 +82,10 @@ class DenseRegistrar:
         """Register ``current`` to ``reference`` from an initial guess; None where too few pixels agree."""
         import open3d as o3d
 
-        T_ref_cam = _closer(reference, current, T_ref_cam)
+        closer = registered(reference.levels, current.levels, T_ref_cam)  # Open3D's method converges from nearby alone
         odometry = o3d.t.pipelines.odometry
         matrix = o3d.core.Tensor.from_numpy(current.intrinsics.matrix)
-        guess = o3d.core.Tensor.from_numpy(T_ref_cam)
+        guess = o3d.core.Tensor.from_numpy(T_ref_cam if closer is None else closer.T_ref_cam)
         far = self._config.max_depth
         criteria = [odometry.OdometryConvergenceCriteria(steps) for steps in self._config.steps]
         try:
@@ -112,14 +109,6 @@ class DenseRegistrar:
         covariance = Ad @ np.linalg.inv(information) @ Ad.T * variance
         inliers = round(found.fitness * current.intrinsics.width * current.intrinsics.height)
         return Registration(T, covariance, inliers, found.fitness < 2 * self._config.min_fitness)
-
-
-def _closer(reference: DenseView, current: DenseView, T_ref_cam: Transform) -> Transform:
-    """A closer guess, by small images: Open3D's method converges from nearby alone."""
-    if reference.levels is None or current.levels is None:
-        return T_ref_cam
-    found = register(reference.levels, current.levels, [T_ref_cam], Belief(T_ref_cam, GUESS))
-    return T_ref_cam if found is None else found.T_ref_cam
 
 
 class DenseOdometry(ReferenceOdometry[DenseView]):

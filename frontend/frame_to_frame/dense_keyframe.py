@@ -27,7 +27,7 @@ class _Registrar:
 
     def register(self, reference: _View, current: _View, T_ref_cam: Transform) -> Registration | None:
         if reference.features is not None and current.features is not None:
-            matched = self._features.register(reference.features, current.features, T_ref_cam)
+            matched = self._features.match(reference.features, current.features)
             T_ref_cam = T_ref_cam if matched is None else matched.T_ref_cam
         return self._dense.register(reference.dense, current.dense, T_ref_cam)
 
