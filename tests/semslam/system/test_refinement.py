@@ -12,7 +12,7 @@ from semslam.geometry.camera import Intrinsics
 from semslam.geometry.se3 import FloatArray, invert, make_transform
 from semslam.loop.verification.neighbours import shared_features
 from semslam.system.refinement import refine
-from semslam.types import Cloud, Features, IntArray, Keyframe, LoopCandidate, LoopConstraint
+from semslam.types import Cloud, Features, IntArray, Keyframe, LoopCandidate, LoopConstraint, Observations
 
 CAMERA = Intrinsics(640, 480, 525.0, 525.0, 320.0, 240.0)
 LOOKING_OUT = make_transform([[0, 0, 1], [-1, 0, 0], [0, -1, 0]], [0, 0, 0])
@@ -110,6 +110,8 @@ def test_poses_stay_where_nothing_was_accepted_or_nothing_is_wanted(
     _, keyframes, solution = two_laps
     refused = replace(solution, verdicts=tuple(replace(v, accepted=False) for v in solution.verdicts))
     assert refine(refused, keyframes, {}, CONFIG) is refused
+    seen = Observations(np.arange(3), np.zeros((3, 2), np.float32), np.ones(3, np.float32))
+    assert refine(refused, keyframes, {0: seen, 1: seen, 2: seen}, CONFIG) is refused
     for change in ({"closures": False}, {"rounds": 0}):
         config = CONFIG.with_changes(backend={"bundle": change})
         assert refine(solution, keyframes, {}, config) is solution
