@@ -85,7 +85,14 @@ def equations(reference: Level, current: Level, T_ref_cam: Transform, clocks: Cl
     agrees = np.abs(surface * depth.points[rows, 2] - 1.0) < AGREES
     darker = color.channels[rows, 0] - brightness[rows]
     residuals = np.stack([darker - np.median(darker[agrees]) if agrees.any() else darker, surface - inverse])
-    by_point = np.stack([color.by_point(reference, rows, 0), depth.by_point(reference, rows, 2)])
+    slopes = depth.slopes(reference, rows)
+    theirs = slopes if color is depth else color.slopes(reference, rows)
+    by_point = np.stack(
+        [
+            _by_point(theirs[:, :2], color.points[rows], reference),
+            _by_point(slopes[:, 2:], depth.points[rows], reference),
+        ]
+    )
     by_point[1, :, 2] += inverse * inverse
     # An occluded or unknown surface says nothing of brightness either.
     weights = _weights(residuals, agrees)
@@ -120,11 +127,10 @@ class _Sight:
     usable: npt.NDArray[np.bool_]
     parts: FloatArray
 
-    def by_point(self, reference: Level, rows: IntArray, first: int) -> FloatArray:
-        """Derivative (R, 3) of a channel, whose slopes are the two from ``first``, by some of the points."""
-        slopes = cv2.remap(reference.slopes, self.u[rows], self.v[rows], cv2.INTER_LINEAR).reshape(-1, 4)
-        points = self.points[rows]
-        return _by_point(slopes[:, first : first + 2].astype(np.float64), points, 1.0 / points[:, 2], reference)
+    def slopes(self, reference: Level, rows: IntArray) -> FloatArray:
+        """Derivatives (R, 4) of the reference's brightness and inverse depth by u and v, where it sees some points."""
+        found = cv2.remap(reference.slopes, self.u[rows], self.v[rows], cv2.INTER_LINEAR)
+        return np.asarray(found.reshape(-1, 4), dtype=np.float64)
 
 
 def _sight(reference: Level, current: Level, T_ref_cam: Transform, clocks: Clocks | None, by_color: bool) -> _Sight:
@@ -163,11 +169,12 @@ def _projected(level: Level, points: Points3) -> tuple[Float32Array, Float32Arra
     return u, v
 
 
-def _by_point(slopes: FloatArray, seen: FloatArray, inverse: FloatArray, level: Level) -> FloatArray:
-    """Derivative (N, 3) of a channel (slopes (N, 2) by u and v) by the point (N, 3) that is looked up in it."""
+def _by_point(slopes: FloatArray, points: Points3, level: Level) -> FloatArray:
+    """Derivative (N, 3) of a channel (slopes (N, 2) by u and v) by the points (N, 3) that are looked up in it."""
+    inverse = 1.0 / points[:, 2]
     x = slopes[:, 0] * level.camera.fx * inverse
     y = slopes[:, 1] * level.camera.fy * inverse
-    return np.column_stack([x, y, -(x * seen[:, 0] + y * seen[:, 1]) * inverse])
+    return np.column_stack([x, y, -(x * points[:, 0] + y * points[:, 1]) * inverse])
 
 
 def _weights(residuals: FloatArray, agrees: npt.NDArray[np.bool_]) -> FloatArray:
