@@ -6,7 +6,7 @@ import numpy as np
 
 from semslam.config import Config, Section, setting
 from semslam.frontend.direct.bridge import Bridge
-from semslam.frontend.direct.search import Registered
+from semslam.frontend.direct.search import CONTRADICTION, Registered
 from semslam.frontend.prediction import ConstantVelocity, RecentVelocity, check_frame, first_motion
 from semslam.frontend.rolling_shutter import depth_readout, rectify_points, velocity_of
 from semslam.frontend.voxel_map import Scan, VoxelMap
@@ -17,8 +17,6 @@ from semslam.types import FloatArray, Frame, Motion, Points3, TrackingStatus, Tr
 
 ALONG_SURFACE = 0.03
 """A point's information along its surface as a share of that across it: small, but edges constrain a little."""
-CONTRADICTION = 22.5
-"""Chi-square of six degrees of freedom at 99.9 %."""
 NEIGHBOURS = 12
 """Neighbouring points from which a surface's normal is computed."""
 

@@ -2,8 +2,8 @@
 
 Least squares counts every loop as evidence of its own. Loops between two rooms that look alike are not: they repeat
 one mistake, are consistent with one another, and together outweigh odometry however many there are. So before anything
-is optimised a loop must lie within what odometry can have drifted, and loops that put one view at two places are
-withheld unless one side is clearly the better founded.
+is optimised a loop must lie within what odometry can have drifted, groups of loops that odometry doubts are withheld,
+and so are loops that put one view at two places, unless one side is clearly the better founded.
 """
 
 from collections.abc import Sequence
@@ -78,7 +78,7 @@ def screen_loops(
     Args:
         chain: odometry, its covariance widened where it was too small.
         loops: edges that may be false.
-        max_residual: Mahalanobis distance that a cycle through two loops may be from closing.
+        max_residual: Mahalanobis distance up to which a single loop counts as true.
         slack: how many times that a loop may lie from odometry alone.
         support: loops that must agree before they join maps.
     """

@@ -52,11 +52,14 @@ class Clocks:
 
     def at_frame(self, motion: FloatArray) -> FloatArray:
         """The motion (6,) at the frame, of that between the frames."""
-        return motion if self.before is None else 1.5 * motion - 0.5 * self.before
+        return self._mixed(self.shares[0], motion)
 
     def at_reference(self, motion: FloatArray) -> FloatArray:
         """The motion (6,) at the reference, of that between the frames."""
-        return motion if self.before is None else 0.5 * motion + 0.5 * self.before
+        return self._mixed(self.shares[1], motion)
+
+    def _mixed(self, share: float, motion: FloatArray) -> FloatArray:
+        return motion if self.before is None else share * motion + (1.0 - share) * self.before
 
 
 def clocks_of(camera: Intrinsics, readout: float, seconds: float, before: FloatArray | None) -> Clocks | None:

@@ -12,6 +12,9 @@ from semslam.types import FloatArray, Transform
 
 TURNS = (-0.3, -0.15, 0.15, 0.3)
 """Radians by which the camera may have turned further, or less far, than expected: left and right, up and down."""
+CONTRADICTION = 22.5
+"""Squared Mahalanobis distance beyond which another estimate of a pose contradicts the registration: chi-square of six
+degrees of freedom at 99.9 %."""
 MIN_OVERLAP = 0.3
 MIN_AGREEMENT = 0.9
 MAX_COST = 1.5

@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from semslam.frontend.direct.search import CONTRADICTION
 from semslam.frontend.feature_map.guided import KeypointGrid, Prediction, match_guided
 from semslam.frontend.feature_map.local_map import LocalMap
 from semslam.geometry.reprojection import Measurements, refine_pose, retract
@@ -12,8 +13,6 @@ from semslam.types import Covariance6, Features, FloatArray, IntArray, Intrinsic
 
 GATE = 7.815
 """Chi-square of three degrees of freedom at 95 %."""
-CONTRADICTION = 22.5
-"""Chi-square of six degrees of freedom at 99.9 %."""
 NOTHING: IntArray = np.zeros(0, dtype=np.int64)
 """No landmarks or keypoints."""
 
