@@ -78,14 +78,14 @@ class KissOdometry:
             self._remember(frame, self._scan(frame, np.zeros(6)), first_motion())
             return first_motion()
         predicted = self._prediction.predict(frame.timestamp)
-        registered = self._bridge.register(frame, predicted, (), frame.intrinsics.readout or 0.0)
+        registered = self._bridge.register(frame, predicted, frame.intrinsics.readout or 0.0)
         guess = predicted if registered is None else registered.T_ref_cam
         scan = self._scan(frame, velocity_of(guess, self._prediction.seconds_since_last(frame.timestamp)))
         located = None if scan is None else self._locate(frame.timestamp, scan, guess)
         found = _one_estimate(registered, located)
         if found is None:
             return self._lose(frame.timestamp, scan)
-        return self._accept(frame, scan, found)
+        return self._accept(frame, scan, found if registered is None else self._bridge.loosened(found))
 
     def _new_map(self) -> VoxelMap:
         return VoxelMap(self._config.voxel, self._config.max_range, self._config.threshold)

@@ -79,4 +79,6 @@ def clocks_of(camera: Intrinsics, readout: float, seconds: float, before: FloatA
 
 def moved(points: Points3, motion: FloatArray, parts: FloatArray) -> Points3:
     """Points (N, 3) in the camera as it was parts (N,) of a motion, a tangent (6,), before: to first order."""
-    return np.asarray(points + parts[:, None] * (np.cross(motion[:3], points) + motion[3:]))
+    x, y, z = motion[:3]
+    turned = points @ np.array([[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]])  # a cross product, by a matrix product
+    return np.asarray(points + parts[:, None] * (turned + motion[3:]))

@@ -44,6 +44,7 @@ def register(
     starts: list[Transform],
     belief: Belief,
     clocks: Clocks | None = None,
+    near: Transform | None = None,
 ) -> Registered | None:
     """Register a frame to another; None where they do not match.
 
@@ -53,7 +54,12 @@ def register(
         starts: (4, 4) guesses, the likeliest first; turns around the last are tried where none leads to a match.
         belief: what is expected of the pose.
         clocks: when the rows of both were seen; None = at once.
+        near: (4, 4) a guess that is good to a few pixels: the finest images alone are tried first.
     """
+    if near is not None:
+        found = align(reference[-1:], current[-1:], near, belief, clocks)
+        if _matches(found):
+            return _registered(found)
     for start in starts:
         found = align(reference, current, start, belief, clocks)
         if _matches(found):

@@ -5,10 +5,9 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
 from semslam.geometry.se3 import Float32Array, FloatArray
-from semslam.types import Frame, Intrinsics, Points3
+from semslam.types import Frame, Intrinsics, Points3, UInt8Array
 
 WIDTHS = (80, 160)
 """Pixels across the images of each level at most, coarsest first; the height is three quarters of it at most."""
@@ -20,6 +19,8 @@ EDGE = 0.1
 """Share of the inverse depth by which neighbours differ across an edge, where nothing may be interpolated."""
 MIN_CONTRAST = 4.0
 """Standard deviation of the grey levels of a usable image: a black or a white one is a fault of the camera."""
+SPARSE = 8
+"""Contrast is measured on every eighth row and column."""
 MIN_COVERAGE = 0.05
 """Share of pixels that must have depth."""
 MIN_POINTS = 100
@@ -60,9 +61,20 @@ def make_levels(frame: Frame, with_color: bool = True) -> tuple[Level, ...] | No
     seen = (depth > 0) & (depth <= MAX_DEPTH)
     if np.count_nonzero(seen) < MIN_COVERAGE * seen.size:
         return None
-    inverse = np.where(seen, 1.0 / np.where(seen, depth, 1.0), 0.0).astype(np.float32)
-    levels = tuple(_level(gray, inverse, seen, camera, width) for width in WIDTHS)
-    return levels if min(len(level.points) for level in levels) >= MIN_POINTS else None
+    inverse = np.divide(1.0, depth, out=np.zeros_like(depth, np.float32), where=seen)
+    share = seen.astype(np.float32)
+    levels = []
+    for width in reversed(WIDTHS):
+        small = camera.scaled(1.0 / math.ceil(max(camera.width / width, camera.height / (0.75 * width))))
+        # Means of means: the coarser images are made from the finer ones.
+        gray, inverse, share = (_shrunk(image, small) for image in (gray, inverse, share))
+        levels.append(_level(gray, inverse, share, small, FINEST_STEP if width == WIDTHS[-1] else 1))
+    return tuple(reversed(levels)) if min(len(level.points) for level in levels) >= MIN_POINTS else None
+
+
+def contrast(color: UInt8Array) -> float:
+    """Standard deviation of an image's (H, W, 3) values."""
+    return float(color[::SPARSE, ::SPARSE].std())
 
 
 def _gray(frame: Frame) -> Float32Array:
@@ -70,15 +82,14 @@ def _gray(frame: Frame) -> Float32Array:
     return np.asarray(cv2.cvtColor(color, cv2.COLOR_RGB2GRAY), dtype=np.float32)
 
 
-def _level(
-    gray: Float32Array, inverse: Float32Array, seen: npt.NDArray[np.bool_], camera: Intrinsics, width: int
-) -> Level:
-    factor = 1.0 / math.ceil(max(camera.width / width, camera.height / (0.75 * width)))
-    small = camera.scaled(factor)
-    size = (small.width, small.height)
-    brightness = cv2.GaussianBlur(cv2.resize(gray, size, interpolation=cv2.INTER_AREA), (3, 3), 0)
-    share = cv2.resize(seen.astype(np.float32), size, interpolation=cv2.INTER_AREA)
-    mean = cv2.resize(inverse, size, interpolation=cv2.INTER_AREA) / np.maximum(share, 1e-6)
+def _shrunk(image: Float32Array, camera: Intrinsics) -> Float32Array:
+    size = (camera.width, camera.height)
+    return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), dtype=np.float32)
+
+
+def _level(gray: Float32Array, inverse: Float32Array, share: Float32Array, small: Intrinsics, step: int) -> Level:
+    brightness = cv2.GaussianBlur(gray, (3, 3), 0)
+    mean = inverse / np.maximum(share, 1e-6)
     known = share > 0.5
     # Neighbours without depth count as an edge: nothing is interpolated towards them.
     shape = np.ones((3, 3), np.uint8)
@@ -95,7 +106,6 @@ def _level(
     inner = smooth.astype(np.uint8)
     inner[[0, -1], :] = inner[:, [0, -1]] = 0
     inner = np.asarray(cv2.erode(inner, shape), dtype=np.uint8)
-    step = FINEST_STEP if width == WIDTHS[-1] else 1
     v, u = (step * axis for axis in np.nonzero(inner[::step, ::step]))
     z = 1.0 / surface[v, u].astype(np.float64)
     points = np.column_stack([(u - small.cx) / small.fx * z, (v - small.cy) / small.fy * z, z])

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from semslam.frontend.direct.search import Registered
-from semslam.geometry.se3 import adjoint, invert, tangent
+from semslam.geometry.se3 import adjoint, invert, tangents
 from semslam.types import Covariance6, FloatArray, Transform, Transforms
 
 GATE = 25.0
@@ -28,18 +28,26 @@ class Link:
     T_earlier_later: Transform
     information: FloatArray
 
-    def error(self, T_earlier: Transform, T_later: Transform) -> FloatArray:
-        """Deviation (6,) of two poses (4, 4) from it, in the later one's frame."""
-        return tangent(invert(self.T_earlier_later) @ invert(T_earlier) @ T_later)
 
-    def squared(self, error: FloatArray) -> float:
-        """Squared Mahalanobis distance of an error."""
-        return float(error @ self.information @ error)
+def errors(links: Sequence[Link], poses: Transforms) -> FloatArray:
+    """Deviations (L, 6) of poses (P, 4, 4) from links, each in the later keyframe's frame."""
+    measured = np.stack([link.T_earlier_later for link in links])
+    earlier, later = poses[[link.earlier for link in links]], poses[[link.later for link in links]]
+    return tangents(invert(measured) @ invert(earlier) @ later)
 
-    def cost(self, T_earlier: Transform, T_later: Transform) -> float:
-        """Robust squared distance of two poses from it."""
-        squared = self.squared(self.error(T_earlier, T_later))
-        return squared if squared <= GATE else 2.0 * float(np.sqrt(GATE * squared)) - GATE
+
+def cost(links: Sequence[Link], poses: Transforms) -> float:
+    """Sum of the robust squared distances of poses (P, 4, 4) from links."""
+    if not links:
+        return 0.0
+    squared = _squared(links, errors(links, poses))
+    return float(np.where(squared <= GATE, squared, 2.0 * np.sqrt(GATE * squared) - GATE).sum())
+
+
+def _squared(links: Sequence[Link], off: FloatArray) -> FloatArray:
+    """Squared Mahalanobis distances (L,) of errors (L, 6)."""
+    information = np.stack([link.information for link in links])
+    return np.asarray((off[:, None, :] @ information @ off[:, :, None])[:, 0, 0])
 
 
 class ImageChain:
@@ -80,10 +88,13 @@ def add_links(links: Sequence[Link], poses: Transforms, free: int, scale: float,
         H: sums of information.
         g: gradients, of what was measured less what the poses give.
     """
-    for link in links:
+    if not links:
+        return
+    all_off = errors(links, poses)
+    shares = scale * np.sqrt(GATE / np.maximum(_squared(links, all_off), GATE))
+    for link, off, share in zip(links, all_off, shares, strict=True):
         T_earlier, T_later = poses[link.earlier], poses[link.later]
-        off = link.error(T_earlier, T_later)
-        weight = scale * link.information * np.sqrt(GATE / max(link.squared(off), GATE))
+        weight = share * link.information
         parts = [(link.later, np.eye(6)), (link.earlier, -adjoint(invert(T_later) @ T_earlier))]
         moving = [(slice(6 * row, 6 * row + 6), J) for row, J in parts if row < free]
         for rows, J in moving:

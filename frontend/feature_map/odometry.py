@@ -1,6 +1,6 @@
 """Odometry against a map of landmarks that it builds and adjusts as it goes."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
@@ -9,6 +9,7 @@ from semslam.config import Config
 from semslam.features import FeatureExtractor
 from semslam.frontend.direct.bridge import Bridge
 from semslam.frontend.direct.search import Registered
+from semslam.frontend.direct.view import Level, make_levels
 from semslam.frontend.feature_map.depth_instant import at_color
 from semslam.frontend.feature_map.landmarks import NONE
 from semslam.frontend.feature_map.links import ImageChain
@@ -28,6 +29,16 @@ from semslam.types import Features, FloatArray, Frame, IntArray, Motion, Observa
 
 FEW = 6
 """Landmarks that support a pose which the images give."""
+SURE = 80
+"""Landmarks whose pose is good to a few pixels."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Prepared:
+    """What a frame alone gives: its keypoints, and its small images where they are wanted at every frame."""
+
+    features: Features
+    levels: tuple[Level, ...] | None
 
 
 class FeatureMapOdometry:
@@ -52,7 +63,7 @@ class FeatureMapOdometry:
         pyramid = {"levels": own.levels, "scale": own.scale}
         self._keypoints = config.keypoints.model_copy(update=pyramid)
         self._extractor = FeatureExtractor(self._keypoints)
-        self._prepared: dict[int, Features] = {}
+        self._prepared: dict[int, _Prepared] = {}
         self._map = LocalMap(config.keypoints.count, self._scale)
         self._mapper = Mapper(self._map, own)
         self._prediction = ConstantVelocity()
@@ -79,9 +90,9 @@ class FeatureMapOdometry:
         return self._readout.seconds
 
     def prepare(self, frame: Frame) -> None:
-        """Find a frame's keypoints ahead of its turn; see ``Preparing``."""
+        """Find a frame's keypoints and make its small images ahead of its turn; see ``Preparing``."""
         check_frame(frame)
-        self._prepared[frame.index] = self._extractor.extract(frame)
+        self._prepared[frame.index] = self._prepare(frame)
 
     def track(self, frame: Frame) -> Motion:
         """Motion since the previous frame, with the landmarks seen; LOST where the frame's place was not found.
@@ -100,8 +111,8 @@ class FeatureMapOdometry:
         return motion
 
     def _track(self, frame: Frame) -> Motion:
-        prepared = self._prepared.pop(frame.index, None)
-        raw = self._extractor.extract(frame) if prepared is None else prepared
+        prepared = self._prepared.pop(frame.index, None) or self._prepare(frame)
+        raw = prepared.features
         self._mapper.proceed()
         if not self._started:
             self._started = True
@@ -118,19 +129,23 @@ class FeatureMapOdometry:
         guess = T_map_prev @ predicted if coarse is None else coarse.T_map_cam
         self._movers.find(frame, guess, self._map_id)
         raw = self._movers.standing_features(raw, frame.intrinsics)
-        velocity = view.velocity
-        if coarse is not None and self._lost_since is None:
-            velocity = self._velocity(frame, invert(T_map_prev) @ guess)
-        view = self._view(frame, raw, velocity)
-        found = None
-        if coarse is not None:
-            found = self._locate(view, guess, self._around(coarse.landmarks), self._config.narrow_radius)
-        images = self._images(frame, T_map_prev, found)
+        images = self._images(frame, prepared.levels, T_map_prev, coarse)
         self._chain.extend(images)
-        if images is not None:
-            found = self._combined(frame, raw, T_map_prev @ images.T_ref_cam, images)
+        if images is None:
+            found = None if coarse is None else self._locate_finely(frame, raw, T_map_prev, coarse)
+        else:
+            found = self._combined(frame, raw, T_map_prev, coarse, images)
         found = found or self._relocalise(view)
         return self._lose(view) if found is None else self._accept(raw, found, T_map_prev)
+
+    def _prepare(self, frame: Frame) -> _Prepared:
+        readout = frame.intrinsics.readout if self._config.readout is None else self._config.readout
+        wanted = bool(self._config.image_inliers) and self._is_global(readout or 0.0)
+        return _Prepared(self._extractor.extract(frame), make_levels(frame) if wanted else None)
+
+    def _is_global(self, readout: float) -> bool:
+        """Whether the shutter is taken to be a global one, whose images are registered at every frame."""
+        return abs(readout) < self._config.image_readout
 
     def _velocity(self, frame: Frame, T_prev_cur: Transform) -> FloatArray:
         return velocity_of(T_prev_cur, self._prediction.seconds_since_last(frame.timestamp))
@@ -168,28 +183,41 @@ class FeatureMapOdometry:
         T_map_cam = match_and_solve(self._map, view, around, self._config.min_inliers, self._seed)
         return None if T_map_cam is None else self._locate(view, T_map_cam, around, radius)
 
-    def _images(self, frame: Frame, T_map_prev: FloatArray, located: Located | None) -> Registered | None:
+    def _locate_finely(self, frame: Frame, raw: Features, T_map_prev: FloatArray, coarse: Located) -> Located | None:
+        """Where the landmarks around those that were found put the frame, straightened by its motion until there."""
+        velocity = coarse.view.velocity
+        if self._lost_since is None:
+            velocity = self._velocity(frame, invert(T_map_prev) @ coarse.T_map_cam)
+        view = self._view(frame, raw, velocity)
+        return self._locate(view, coarse.T_map_cam, self._around(coarse.landmarks), self._config.narrow_radius)
+
+    def _images(
+        self, frame: Frame, levels: tuple[Level, ...] | None, T_map_prev: FloatArray, coarse: Located | None
+    ) -> Registered | None:
         """The motion since the frame before by all pixels of the images, where that is wanted and they match.
 
-        Registration takes a frame to be of one instant. So it helps where a shutter is global, and where landmarks are
-        too few for anything better.
+        It is exact where a shutter is global. Where it rolls, velocity is taken to change evenly, and images help where
+        landmarks are few.
         """
+        known = 0 if coarse is None else len(coarse.landmarks)
+        if known >= self._config.image_inliers and not self._is_global(self._readout.seconds):
+            return None
         if not self._config.image_inliers:
             return None
-        if (
-            located is not None
-            and len(located.landmarks) >= self._config.image_inliers
-            and abs(self._readout.seconds) >= self._config.image_readout
-        ):
-            return None
-        guesses = [] if located is None else [invert(T_map_prev) @ located.T_map_cam]
+        near = invert(T_map_prev) @ coarse.T_map_cam if coarse is not None and known >= SURE else None
+        standing = self._movers.standing(frame)
+        levels = levels if standing is frame else None
         predicted = self._prediction.predict(frame.timestamp)
-        return self._bridge.register(self._movers.standing(frame), predicted, guesses, self._readout.seconds)
+        found = self._bridge.register(standing, predicted, self._readout.seconds, near, levels)
+        return None if found is None else self._bridge.loosened(found)
 
-    def _combined(self, frame: Frame, raw: Features, T_map_cam: FloatArray, images: Registered) -> Located:
+    def _combined(
+        self, frame: Frame, raw: Features, T_map_prev: FloatArray, coarse: Located | None, images: Registered
+    ) -> Located:
         """Where images and landmarks together put the frame, each as far as it is certain."""
+        T_map_cam = T_map_prev @ images.T_ref_cam
         view = self._view(frame, raw, self._velocity(frame, images.T_ref_cam))
-        around = self._around(self._tracked)
+        around = self._around(self._tracked if coarse is None else coarse.landmarks)
         landmarks = self._locate(view, T_map_cam, around, self._config.narrow_radius, FEW)
         return combine(view, T_map_cam, images.information, landmarks)
 

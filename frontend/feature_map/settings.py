@@ -11,7 +11,7 @@ class FeatureMapConfig(Section):
     min_inliers: int = setting(15, "inlier landmarks that a pose needs", gt=5)
     sure_inliers: int = setting(40, "inlier landmarks below which a pose is degraded", gt=5)
     image_inliers: int = setting(
-        80, "inlier landmarks below which a rolling shutter's images are registered as well; 0 = never", ge=0
+        160, "inlier landmarks below which a rolling shutter's images are registered as well; 0 = never", ge=0
     )
     image_readout: float = setting(
         0.002, "read-out below which every frame's images are registered; 0 = where landmarks are few", unit="s", ge=0

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 
 from semslam.config import Config, Section, setting
-from semslam.frontend.direct.view import Level, make_levels
+from semslam.frontend.direct.view import Level, contrast, make_levels
 from semslam.frontend.frame_to_frame.images import registered
 from semslam.frontend.frame_to_frame.reference import ReferenceOdometry, Registration
 from semslam.geometry.camera import Intrinsics
@@ -68,7 +68,7 @@ class DenseRegistrar:
         depth = np.where((frame.depth > 0) & (frame.depth <= self._config.max_depth), frame.depth, 0).astype(np.float32)
         if min(depth.shape) < MIN_SIZE or np.count_nonzero(depth) < self._config.min_coverage * depth.size:
             return None
-        if frame.color.std() < self._config.min_contrast:
+        if contrast(frame.color) < self._config.min_contrast:
             return None
         import open3d as o3d
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from semslam.config import Config, Section, setting
 from semslam.features import FeatureExtractor, match_descriptors, solve_pnp
-from semslam.frontend.direct.view import MIN_CONTRAST, Level, make_levels
+from semslam.frontend.direct.view import MIN_CONTRAST, Level, contrast, make_levels
 from semslam.frontend.frame_to_frame.images import registered
 from semslam.frontend.frame_to_frame.reference import ReferenceOdometry, Registration
 from semslam.frontend.rolling_shutter import still
@@ -76,7 +76,7 @@ class FeatureRegistrar:
 
 def _levels(frame: Frame) -> tuple[Level, ...] | None:
     """A frame's small images; None where they hold too little."""
-    return None if frame.color.std() < MIN_CONTRAST else make_levels(frame)
+    return None if contrast(frame.color) < MIN_CONTRAST else make_levels(frame)
 
 
 class FeatureOdometry(ReferenceOdometry[FeatureView]):

@@ -83,6 +83,16 @@ def tangent(T: FloatArray) -> FloatArray:
     return np.concatenate([log_so3(T[:3, :3]), T[:3, 3]])
 
 
+def tangents(T: FloatArray) -> FloatArray:
+    """Rotation vectors and translations (N, 6) of motions (N, 4, 4) of less than half a turn."""
+    R = T[:, :3, :3]
+    axis = np.stack([R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]], 1)
+    sine = np.linalg.norm(axis, axis=1)
+    angle = np.arctan2(sine, np.trace(R, axis1=1, axis2=2) - 1.0)
+    factor = np.divide(angle, sine, out=np.full(len(T), 0.5), where=sine > 1e-12)
+    return np.concatenate([factor[:, None] * axis, T[:, :3, 3]], axis=1)
+
+
 def orthonormalise(T: FloatArray) -> FloatArray:
     """Project the rotations of transforms (..., 4, 4) onto SO(3); removes the drift of long products."""
     U, _, Vt = np.linalg.svd(T[..., :3, :3])

@@ -52,7 +52,7 @@ def followed(frames: list[Frame], truth: list[Transform]) -> FloatArray:
             bridge.tracked(frame, np.eye(4), np.eye(6) * 1e-4)
             continue
         true = invert(truth[k - 1]) @ truth[k]
-        found = bridge.register(frame, np.eye(4), (), frame.intrinsics.readout or 0.0)
+        found = bridge.register(frame, np.eye(4), frame.intrinsics.readout or 0.0)
         assert found is not None
         errors.append(tangent(invert(true) @ found.T_ref_cam))
         bridge.tracked(frame, found.T_ref_cam, np.eye(6) * 1e-4)
@@ -71,3 +71,23 @@ def test_motion_is_registered_better_where_the_rows_instants_are_known(timing: d
     known = [replace(frame, intrinsics=replace(frame.intrinsics, **timing)) for frame in frames]
     without, informed = (np.abs(followed(each, truth)[1:, :3]).mean() for each in (frames, known))
     assert informed < 0.7 * without
+
+
+def deviations(readout: float, before: FloatArray) -> FloatArray:
+    """Standard deviations (6,) of a motion, of which rows are read out one after another, by that before."""
+    frames = [open_dataset("synthetic:room").frame(k) for k in FRAMES[:3]]
+    bridge, T_prev_cur = Bridge(), make_transform(exp_so3(before[:3]), before[3:])
+    for frame in frames[:2]:
+        bridge.tracked(frame, T_prev_cur, np.eye(6) * 1e-4)
+    found = bridge.register(frames[2], np.eye(4), readout)
+    assert found is not None
+    return np.sqrt(np.diag(np.linalg.inv(bridge.loosened(found).information)))
+
+
+def test_a_rolling_shutter_is_less_certain_the_more_the_velocity_changes() -> None:
+    truth = open_dataset("synthetic:room").ground_truth
+    assert truth is not None
+    steady = tangent(invert(truth.poses[FRAMES[1]]) @ truth.poses[FRAMES[2]])
+    turning = steady + np.array([0.0, 0.1, 0.0, 0.0, 0.0, 0.0])
+    assert (deviations(0.03, turning) > 2.0 * deviations(0.03, steady)).all()
+    assert deviations(0.0, turning) == pytest.approx(deviations(0.0, steady), rel=0.2)

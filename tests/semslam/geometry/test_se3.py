@@ -21,6 +21,8 @@ from semslam.geometry.se3 import (
     quaternions_to_rotations,
     rotation_angle,
     rotations_to_quaternions,
+    tangent,
+    tangents,
     transform_points,
 )
 
@@ -45,6 +47,12 @@ def test_rotation_vector_survives_exp_and_log(vector: list[float]) -> None:
     assert float(rotation_angle(make_transform(exp_so3(vector), np.zeros(3)))) == pytest.approx(
         np.linalg.norm(vector), abs=1e-9
     )
+
+
+@given(st.lists(transforms, min_size=1, max_size=5))
+def test_many_tangents_are_those_of_each(many: list[FloatArray]) -> None:
+    small = [make_transform(exp_so3(0.1 * log_so3(T[:3, :3])), T[:3, 3]) for T in many]
+    np.testing.assert_allclose(tangents(np.stack(small)), [tangent(T) for T in small], atol=1e-9)
 
 
 @given(st.lists(transforms, min_size=1, max_size=5))
