@@ -19,6 +19,8 @@ ALONG_SURFACE = 0.03
 """A point's information along its surface as a share of that across it: small, but edges constrain a little."""
 NEIGHBOURS = 12
 """Neighbouring points from which a surface's normal is computed."""
+LASTING = 0.3
+"""Share of the error by a velocity that changes which lasts: what one frame is off by, the next takes back in part."""
 
 
 class KissConfig(Section):
@@ -85,7 +87,7 @@ class KissOdometry:
         found = _one_estimate(registered, located)
         if found is None:
             return self._lose(frame.timestamp, scan)
-        return self._accept(frame, scan, found if registered is None else self._bridge.loosened(found))
+        return self._accept(frame, scan, found if registered is None else self._bridge.loosened(found, LASTING))
 
     def _new_map(self) -> VoxelMap:
         return VoxelMap(self._config.voxel, self._config.max_range, self._config.threshold)

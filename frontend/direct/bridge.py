@@ -93,9 +93,14 @@ class Bridge:
         self._unmodelled = _unmodelled(tangent(found.T_ref_cam), before, readout / seconds, current[-1])
         return Registered(invert(T_tracked_prev) @ found.T_ref_cam, found.information)
 
-    def loosened(self, found: Registered) -> Registered:
-        """The frame that was registered last, less certain by what registration takes to be exact."""
-        return Registered(found.T_ref_cam, _inverse(_inverse(found.information) + self._unmodelled))
+    def loosened(self, found: Registered, share: float = 1.0) -> Registered:
+        """The frame that was registered last, less certain by what registration takes to be exact.
+
+        Args:
+            found: its motion.
+            share: of the standard deviation of that.
+        """
+        return Registered(found.T_ref_cam, _inverse(_inverse(found.information) + share**2 * self._unmodelled))
 
     def _expected(self, seconds: float) -> Covariance6:
         """Covariance (6, 6) of the motion predicted over a time: velocity is known in part, and changes."""
