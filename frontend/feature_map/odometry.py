@@ -200,9 +200,8 @@ class FeatureMapOdometry:
         landmarks are few.
         """
         known = 0 if coarse is None else len(coarse.landmarks)
-        if known >= self._config.image_inliers and not self._is_global(self._readout.seconds):
-            return None
-        if not self._config.image_inliers:
+        enough = self._config.image_inliers
+        if not enough or (known >= enough and not self._is_global(self._readout.seconds)):
             return None
         near = invert(T_map_prev) @ coarse.T_map_cam if coarse is not None and known >= SURE else None
         standing = self._movers.standing(frame)
