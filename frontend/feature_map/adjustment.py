@@ -10,8 +10,7 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from semslam.frontend.feature_map.links import Link, add_links
-from semslam.frontend.feature_map.links import cost as links_cost
+from semslam.frontend.feature_map.links import Link, add_links, link_cost
 from semslam.geometry.camera import Intrinsics
 from semslam.geometry.reprojection import (
     Measurements,
@@ -107,7 +106,7 @@ class BundleAdjustment:
         gate = self._problem.gate
         errors = gated_errors(residual, self._problem.seen.weights, camera_points[2])
         errors = np.minimum(errors[self._active], 1e6)
-        linked = links_cost(self._problem.links, poses)
+        linked = link_cost(self._problem.links, poses)
         seen = float(np.where(errors <= gate, errors, 2.0 * np.sqrt(gate * errors) - gate).sum())
         return seen + self._problem.link_scale * linked
 

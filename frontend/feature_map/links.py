@@ -29,18 +29,18 @@ class Link:
     information: FloatArray
 
 
-def errors(links: Sequence[Link], poses: Transforms) -> FloatArray:
+def link_errors(links: Sequence[Link], poses: Transforms) -> FloatArray:
     """Deviations (L, 6) of poses (P, 4, 4) from links, each in the later keyframe's frame."""
     measured = np.stack([link.T_earlier_later for link in links])
     earlier, later = poses[[link.earlier for link in links]], poses[[link.later for link in links]]
     return tangents(invert(measured) @ invert(earlier) @ later)
 
 
-def cost(links: Sequence[Link], poses: Transforms) -> float:
+def link_cost(links: Sequence[Link], poses: Transforms) -> float:
     """Sum of the robust squared distances of poses (P, 4, 4) from links."""
     if not links:
         return 0.0
-    squared = _squared(links, errors(links, poses))
+    squared = _squared(links, link_errors(links, poses))
     return float(np.where(squared <= GATE, squared, 2.0 * np.sqrt(GATE * squared) - GATE).sum())
 
 
@@ -90,7 +90,7 @@ def add_links(links: Sequence[Link], poses: Transforms, free: int, scale: float,
     """
     if not links:
         return
-    all_off = errors(links, poses)
+    all_off = link_errors(links, poses)
     shares = scale * np.sqrt(GATE / np.maximum(_squared(links, all_off), GATE))
     for link, off, share in zip(links, all_off, shares, strict=True):
         T_earlier, T_later = poses[link.earlier], poses[link.later]

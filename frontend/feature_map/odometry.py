@@ -7,10 +7,10 @@ import numpy as np
 
 from semslam.config import Config
 from semslam.features import FeatureExtractor
-from semslam.frontend.direct.bridge import Bridge
 from semslam.frontend.direct.search import Registered
-from semslam.frontend.direct.view import Level, make_levels
+from semslam.frontend.direct.view import Level
 from semslam.frontend.feature_map.depth_instant import at_color
+from semslam.frontend.feature_map.images import FrameImages
 from semslam.frontend.feature_map.landmarks import NONE
 from semslam.frontend.feature_map.links import ImageChain
 from semslam.frontend.feature_map.local_map import LocalMap, MapKeyframe
@@ -29,8 +29,6 @@ from semslam.types import Features, FloatArray, Frame, IntArray, Motion, Observa
 
 FEW = 6
 """Landmarks that support a pose which the images give."""
-SURE = 80
-"""Landmarks whose pose is good to a few pixels."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,7 +54,7 @@ class FeatureMapOdometry:
 
     def __init__(self, config: Config) -> None:
         own = self._config = config.section(FeatureMapOdometry.name, FeatureMapConfig)
-        self._bridge, self._chain = Bridge(), ImageChain()
+        self._images, self._chain = FrameImages(own), ImageChain()
         self._seed = config.seed
         # Fewer and wider levels than the verification's: cheaper, and landmarks are placed better.
         self._scale = own.scale
@@ -104,9 +102,9 @@ class FeatureMapOdometry:
         with one_blas_thread():
             motion = self._track(frame)
         if motion.status is TrackingStatus.LOST:
-            self._bridge.lost(motion.T_prev_cur)
+            self._images.lost(motion.T_prev_cur)
         else:
-            self._bridge.tracked(self._movers.standing(frame), motion.T_prev_cur, motion.covariance)
+            self._images.tracked(self._movers.standing(frame), motion.T_prev_cur, motion.covariance)
             self._movers.remember(frame, self._T_reported, self._map_id)
         return motion
 
@@ -129,7 +127,9 @@ class FeatureMapOdometry:
         guess = T_map_prev @ predicted if coarse is None else coarse.T_map_cam
         self._movers.find(frame, guess, self._map_id)
         raw = self._movers.standing_features(raw, frame.intrinsics)
-        images = self._images(frame, prepared.levels, T_map_prev, coarse)
+        standing = self._movers.standing(frame)
+        levels = prepared.levels if standing is frame else None
+        images = self._images.register(standing, levels, predicted, self._readout.seconds, T_map_prev, coarse)
         self._chain.extend(images)
         if images is None:
             found = None if coarse is None else self._locate_finely(frame, raw, T_map_prev, coarse)
@@ -139,13 +139,7 @@ class FeatureMapOdometry:
         return self._lose(view) if found is None else self._accept(raw, found, T_map_prev)
 
     def _prepare(self, frame: Frame) -> _Prepared:
-        readout = frame.intrinsics.readout if self._config.readout is None else self._config.readout
-        wanted = bool(self._config.image_inliers) and self._is_global(readout or 0.0)
-        return _Prepared(self._extractor.extract(frame), make_levels(frame) if wanted else None)
-
-    def _is_global(self, readout: float) -> bool:
-        """Whether the shutter is taken to be a global one, whose images are registered at every frame."""
-        return abs(readout) < self._config.image_readout
+        return _Prepared(self._extractor.extract(frame), self._images.prepare(frame))
 
     def _velocity(self, frame: Frame, T_prev_cur: Transform) -> FloatArray:
         return velocity_of(T_prev_cur, self._prediction.seconds_since_last(frame.timestamp))
@@ -190,25 +184,6 @@ class FeatureMapOdometry:
             velocity = self._velocity(frame, invert(T_map_prev) @ coarse.T_map_cam)
         view = self._view(frame, raw, velocity)
         return self._locate(view, coarse.T_map_cam, self._around(coarse.landmarks), self._config.narrow_radius)
-
-    def _images(
-        self, frame: Frame, levels: tuple[Level, ...] | None, T_map_prev: FloatArray, coarse: Located | None
-    ) -> Registered | None:
-        """The motion since the frame before by all pixels of the images, where that is wanted and they match.
-
-        It is exact where a shutter is global. Where it rolls, velocity is taken to change evenly, and images help where
-        landmarks are few.
-        """
-        known = 0 if coarse is None else len(coarse.landmarks)
-        enough = self._config.image_inliers
-        if not enough or (known >= enough and not self._is_global(self._readout.seconds)):
-            return None
-        near = invert(T_map_prev) @ coarse.T_map_cam if coarse is not None and known >= SURE else None
-        standing = self._movers.standing(frame)
-        levels = levels if standing is frame else None
-        predicted = self._prediction.predict(frame.timestamp)
-        found = self._bridge.register(standing, predicted, self._readout.seconds, near, levels)
-        return None if found is None else self._bridge.loosened(found)
 
     def _combined(
         self, frame: Frame, raw: Features, T_map_prev: FloatArray, coarse: Located | None, images: Registered

@@ -50,6 +50,19 @@ def test_a_turn_that_was_not_expected_is_found() -> None:
     assert rotation_angle(invert(T_ref_cam) @ found.T_ref_cam) < 0.003
 
 
+def test_a_near_guess_leads_to_the_same_pose_and_a_wrong_one_does_no_harm() -> None:
+    clip = room()
+    theirs, ours = make_levels(clip.frames[2]), make_levels(clip.frames[3])
+    assert theirs is not None
+    assert ours is not None
+    T_ref_cam = invert(clip.poses[2]) @ clip.poses[3]
+    for off in (0.01, 0.6):
+        near = T_ref_cam @ make_transform(exp_so3([0.0, off, 0.0]), np.zeros(3))
+        found = register(theirs, ours, [np.eye(4)], Belief(np.eye(4), VAGUE), near=near)
+        assert found is not None
+        assert np.abs(tangent(invert(T_ref_cam) @ found.T_ref_cam)).max() < 0.01
+
+
 def test_along_a_bare_wall_nothing_but_the_belief_counts() -> None:
     expected = make_transform(np.eye(3), [0.02, 0.01, 0.0])
     found = registered(wall(0.2), wall(0.2), expected)

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from semslam.frontend.direct.search import Registered
-from semslam.frontend.feature_map.links import ImageChain, Link, add_links, cost, errors
+from semslam.frontend.feature_map.links import ImageChain, Link, add_links, link_cost, link_errors
 from semslam.geometry.reprojection import retract
 from semslam.geometry.se3 import invert
 
@@ -34,7 +34,7 @@ def test_a_chain_is_the_product_of_its_motions_with_the_sum_of_their_errors(seed
     drawn = []
     for _ in range(400):
         noisy = [retract(T, rng.normal(0, sigma, 6)) for T in motions]
-        drawn.append(errors([link], np.stack([np.eye(4), np.linalg.multi_dot(noisy)]))[0])
+        drawn.append(link_errors([link], np.stack([np.eye(4), np.linalg.multi_dot(noisy)]))[0])
     expected = np.sqrt(np.diag(np.linalg.inv(link.information)))
     np.testing.assert_allclose(np.std(drawn, axis=0), expected, rtol=0.25)
 
@@ -68,4 +68,4 @@ def test_links_alone_lead_the_free_poses_to_where_they_say(seed, free):
         tangents = np.linalg.solve(H, g)
         poses[:free] = [retract(T, tangents[6 * k : 6 * k + 6]) for k, T in enumerate(poses[:free])]
     np.testing.assert_allclose(poses, np.stack(truth), atol=1e-6)
-    assert cost(links, np.stack(truth)) < 1e-12
+    assert link_cost(links, np.stack(truth)) < 1e-12
