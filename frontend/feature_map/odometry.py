@@ -7,9 +7,9 @@ import numpy as np
 
 from semslam.config import Config
 from semslam.features import FeatureExtractor
+from semslam.frontend.depth_instant import at_color
 from semslam.frontend.direct.search import Registered
 from semslam.frontend.direct.view import Level
-from semslam.frontend.feature_map.depth_instant import at_color
 from semslam.frontend.feature_map.images import FrameImages
 from semslam.frontend.feature_map.landmarks import NONE
 from semslam.frontend.feature_map.links import ImageChain

@@ -8,7 +8,7 @@ import pytest
 from semslam.config import KeypointConfig
 from semslam.datasets.synthetic import Request, SyntheticDataset
 from semslam.features import FeatureExtractor
-from semslam.frontend.feature_map.depth_instant import at_color
+from semslam.frontend.depth_instant import at_color
 from semslam.frontend.rolling_shutter import velocity_of
 from semslam.geometry.se3 import invert
 from semslam.types import FloatArray, Frame
