@@ -1,11 +1,11 @@
 """Sensors estimated from recordings: against the truth of rendered ones, and what the estimate is worth in a run.
 
     python benchmarks/sensor.py [--scene room] [--frames 60] [--readouts 0 0.01 0.026 0.033] [--delays -0.02 0 0.02]
-        [--depth-readout 0.03] [--seeds 0] [--track]
+        [--depth-readout 0.03] [--seeds 0] [--track feature_map ...]
     python benchmarks/sensor.py --sequence DIR... [--frames 300]
     python benchmarks/sensor.py --freiburg1 FOLDER
 
-Rendered scenes state nothing of their timing here. ``--track`` adds the live ATE of ``feature_map`` over the same
+Rendered scenes state nothing of their timing here. ``--track`` adds the live ATE of odometries over the same
 frames with the true times, with those that a run would estimate, and with none. ``--sequence`` estimates the
 sensor of recordings. ``--freiburg1`` runs the nine sequences of TUM's fr1 that lie in a folder, whole and with default
 settings, and prints their final ATE.
@@ -20,11 +20,11 @@ from pathlib import Path
 
 import numpy as np
 
+from semslam import plugins
 from semslam.config import Config
 from semslam.datasets import open_dataset
 from semslam.datasets.camera_file import CameraSetup
 from semslam.eval.trajectory import score_trajectory
-from semslam.frontend.feature_map.odometry import FeatureMapOdometry
 from semslam.frontend.sensor.calibration import calibrate
 from semslam.frontend.sensor.estimate import Estimate
 from semslam.geometry.camera import Intrinsics
@@ -40,9 +40,9 @@ def cell(found: Estimate) -> str:
     return f"{1000 * found.value:.1f} ± {1000 * found.sigma:.1f}" if found.is_determined else "-"
 
 
-def live_ate(frames: Iterable[Frame], truth: Trajectory, camera: Intrinsics) -> str:
+def live_ate(name: str, frames: Iterable[Frame], truth: Trajectory, camera: Intrinsics) -> str:
     """ATE of the causal poses in centimetres."""
-    odometry = FeatureMapOdometry.from_config(Config())
+    odometry = plugins.load("semslam.odometry", name).from_config(Config())
     stamps, motions = [], []
     for frame in frames:
         stamps.append(frame.timestamp)
@@ -55,8 +55,9 @@ def live_ate(frames: Iterable[Frame], truth: Trajectory, camera: Intrinsics) -> 
 def rendered(arguments: argparse.Namespace) -> None:
     """A row for each read-out, delay and seed."""
     columns = ["scene", "seed", "read-out", "delay", "read-out found", "delay found", "depth's read-out found"]
-    print_row([*columns, *(["ATE true, cm", "ATE estimated, cm", "ATE none, cm"] if arguments.track else [])])
-    print_row(["---"] * (len(columns) + 3 * arguments.track))
+    columns += [f"{name}, {times}" for name in arguments.track for times in ("true", "estimated", "none")]
+    print_row(columns)
+    print_row(["---"] * len(columns))
     for seed, readout, delay in product(arguments.seeds, arguments.readouts, arguments.delays):
         timing = f"readout={readout}&delay={delay}&depth_readout={arguments.depth_readout}&stated=0"
         dataset = open_dataset(f"synthetic:{arguments.scene}?seed={seed}&{timing}")
@@ -64,11 +65,15 @@ def rendered(arguments: argparse.Namespace) -> None:
         estimate = calibrate(frames)
         found = [cell(estimate.readout), cell(estimate.delay), cell(estimate.depth_readout)]
         errors = []
-        if arguments.track and dataset.ground_truth is not None:
+        if dataset.ground_truth is not None:
             unknown = dataset.intrinsics
             true = replace(unknown, readout=readout, delay=delay, depth_readout=arguments.depth_readout)
             estimated = estimate.applied(CameraSetup(unknown)).intrinsics
-            errors = [live_ate(frames, dataset.ground_truth, camera) for camera in (true, estimated, unknown)]
+            errors = [
+                live_ate(name, frames, dataset.ground_truth, camera)
+                for name in arguments.track
+                for camera in (true, estimated, unknown)
+            ]
         print_row([arguments.scene, str(seed), f"{1000 * readout:.0f}", f"{1000 * delay:.0f}", *found, *errors])
 
 
@@ -111,7 +116,7 @@ def main() -> None:
     parser.add_argument("--delays", type=float, nargs="+", default=[-0.02, 0.0, 0.02])
     parser.add_argument("--depth-readout", type=float, default=0.03)
     parser.add_argument("--seeds", type=int, nargs="+", default=[0])
-    parser.add_argument("--track", action="store_true")
+    parser.add_argument("--track", nargs="+", default=[], metavar="ODOMETRY")
     parser.add_argument("--sequence", type=Path, nargs="+")
     parser.add_argument("--freiburg1", type=Path)
     arguments = parser.parse_args()

@@ -26,7 +26,7 @@ def at_color(
         config: which depths are usable.
     """
     camera = frame.intrinsics
-    depth_readout = readout if camera.depth_readout is None else camera.depth_readout
+    depth_readout = camera.depth_readout_beside(readout)
     if not len(features) or (camera.delay == 0 and depth_readout == readout):
         return features
     pixels = features.pixels.astype(np.float64)

@@ -82,7 +82,8 @@ class DetailExtractor:
             keyframe: one without.
             frame: its images.
         """
-        return replace(keyframe, details=still(self._extractor.extract(frame), frame, keyframe.velocity))
+        details = still(self._extractor.extract(frame), frame, keyframe.velocity, self._extractor.config)
+        return replace(keyframe, details=details)
 
 
 class KeyframeBuilder:
@@ -160,7 +161,7 @@ class KeyframeBuilder:
             T_odom_cam=T_odom_cam,
             map_id=map_id,
             intrinsics=frame.intrinsics,
-            features=still(features, frame, velocity),
+            features=still(features, frame, velocity, self._extractor.config),
             cloud=still_cloud(make_cloud(frame, self._config), frame, velocity),
             velocity=velocity,
         )

@@ -8,7 +8,7 @@ from semslam.config import Config, Section, setting
 from semslam.frontend.direct.bridge import Bridge
 from semslam.frontend.direct.search import CONTRADICTION, Registered
 from semslam.frontend.prediction import ConstantVelocity, RecentVelocity, check_frame, first_motion
-from semslam.frontend.rolling_shutter import depth_readout, rectify_points, velocity_of
+from semslam.frontend.rolling_shutter import rectify_points, velocity_of
 from semslam.frontend.voxel_map import Scan, VoxelMap
 from semslam.geometry.reprojection import retract
 from semslam.geometry.se3 import invert, is_rigid, orthonormalise, rotation_angle, tangent
@@ -99,7 +99,7 @@ class KissOdometry:
         points = points[points[:, 2] <= self._config.max_range]
         if len(points) < self._config.min_points:
             return None
-        return self._map.scan(rectify_points(points, camera, velocity, depth_readout(camera)))
+        return self._map.scan(rectify_points(points, camera, velocity))
 
     def _locate(self, timestamp: float, scan: Scan, guess: Transform) -> Registered | None:
         """The motion by the map, or None where that is far from the guess."""

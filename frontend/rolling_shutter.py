@@ -2,13 +2,15 @@
 
 A Kinect's colour camera takes about 26 ms from its first row to its last. At 100 degrees a second that bends the image
 by more than 20 pixels, which no rigid pose explains. What was seen is moved to where it would have been seen had all
-rows been exposed with the principal point's row.
+rows been exposed with the principal point's row. Depth has rows of its own, and may be measured before or after colour.
 """
 
 from dataclasses import replace
 
 import numpy as np
 
+from semslam.config import KeypointConfig
+from semslam.frontend.depth_instant import at_color
 from semslam.geometry.se3 import tangent
 from semslam.types import Cloud, Features, FloatArray, Frame, Intrinsics, Points3, Transform
 
@@ -45,43 +47,56 @@ def rectify(features: Features, camera: Intrinsics, velocity: FloatArray, readou
     )
 
 
-def rectify_cloud(cloud: Cloud, camera: Intrinsics, velocity: FloatArray, readout: float) -> Cloud:
-    """Move a cloud's points and normals to where a global shutter would have seen them; arguments as in ``rectify``."""
-    if readout == 0 or not len(cloud):
+def rectify_cloud(cloud: Cloud, camera: Intrinsics, velocity: FloatArray) -> Cloud:
+    """Move a cloud's points and normals to where colour's principal row saw them; arguments as for points."""
+    if not len(cloud) or _depth_is_of_colors_instant(camera):
         return cloud
     points, normals = cloud.points.astype(np.float64), cloud.normals.astype(np.float64)
-    normals += _delays(points, camera, readout) * np.cross(velocity[:3], normals)
+    normals += _delays_of_depth(points, camera) * np.cross(velocity[:3], normals)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    points = rectify_points(points, camera, velocity, readout)
+    points = rectify_points(points, camera, velocity)
     return replace(cloud, points=points.astype(np.float32), normals=normals.astype(np.float32))
 
 
-def rectify_points(points: Points3, camera: Intrinsics, velocity: FloatArray, readout: float) -> Points3:
-    """Move points (N, 3) in front of the camera likewise; arguments as in ``rectify``."""
-    if readout == 0 or not len(points):
+def rectify_points(points: Points3, camera: Intrinsics, velocity: FloatArray) -> Points3:
+    """Move points that depth measured to where they were when colour's principal row was exposed.
+
+    Args:
+        points: (N, 3) metres, in front of the camera.
+        camera: states when depth is measured.
+        velocity: (6,) angular and linear, radians and metres a second, in the camera's frame.
+    """
+    if not len(points) or _depth_is_of_colors_instant(camera):
         return points
     moved = np.cross(velocity[:3], points) + velocity[3:]
-    return np.asarray(points + _delays(points, camera, readout) * moved)
+    return np.asarray(points + _delays_of_depth(points, camera) * moved)
 
 
-def _delays(points: Points3, camera: Intrinsics, readout: float) -> FloatArray:
-    """Seconds (N, 1) by which the rows that see points (N, 3) are read out after the principal point's."""
-    return np.asarray(readout * camera.fy * points[:, 1:2] / points[:, 2:] / camera.height)
+def _depth_is_of_colors_instant(camera: Intrinsics) -> bool:
+    return camera.delay == camera.depth_readout_beside(camera.readout or 0.0) == 0
 
 
-def still(features: Features, frame: Frame, velocity: FloatArray | None) -> Features:
-    """A frame's keypoints as a global shutter would have seen them, where the camera's velocity is known."""
+def _delays_of_depth(points: Points3, camera: Intrinsics) -> FloatArray:
+    """Seconds (N, 1) by which depth measures points (N, 3) after colour's principal row is exposed."""
+    rows = camera.fy * points[:, 1:2] / points[:, 2:] / camera.height
+    return np.asarray(camera.delay + camera.depth_readout_beside(camera.readout or 0.0) * rows)
+
+
+def still(features: Features, frame: Frame, velocity: FloatArray | None, config: KeypointConfig) -> Features:
+    """A frame's keypoints, and their depth, as a global shutter would have seen them.
+
+    Args:
+        features: the frame's, undistorted, with the depth at their pixel.
+        frame: whose camera states its timing.
+        velocity: (6,) of the camera; None = not known, and nothing is moved.
+        config: which depths are usable.
+    """
     if velocity is None:
         return features
-    return rectify(features, frame.intrinsics, velocity, frame.intrinsics.readout or 0.0)
+    readout = frame.intrinsics.readout or 0.0
+    return rectify(at_color(features, frame, velocity, readout, config), frame.intrinsics, velocity, readout)
 
 
 def still_cloud(cloud: Cloud, frame: Frame, velocity: FloatArray | None) -> Cloud:
-    """The same of its cloud, whose rows are read out with colour's unless the camera states otherwise."""
-    camera = frame.intrinsics
-    return cloud if velocity is None else rectify_cloud(cloud, camera, velocity, depth_readout(camera))
-
-
-def depth_readout(camera: Intrinsics) -> float:
-    """Seconds from depth's first row to its last, as far as the camera states them: 0 where it does not."""
-    return (camera.readout if camera.depth_readout is None else camera.depth_readout) or 0.0
+    """The same of its cloud."""
+    return cloud if velocity is None else rectify_cloud(cloud, frame.intrinsics, velocity)

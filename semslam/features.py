@@ -36,6 +36,11 @@ class FeatureExtractor:
             fastThreshold=config.fast_threshold,
         )
 
+    @property
+    def config(self) -> KeypointConfig:
+        """Its settings."""
+        return self._config
+
     def extract(self, frame: Frame) -> Features:
         """Find and describe keypoints; none (not an error) in a dark, blank or tiny image."""
         gray = cv2.cvtColor(frame.color, cv2.COLOR_RGB2GRAY)

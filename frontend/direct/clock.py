@@ -71,7 +71,7 @@ def clocks_of(camera: Intrinsics, readout: float, seconds: float, before: FloatA
         seconds: from the one frame to the other.
         before: (6,) motion over as long a time until the reference, or None.
     """
-    depth_readout = readout if camera.depth_readout is None else camera.depth_readout
+    depth_readout = camera.depth_readout_beside(readout)
     if readout == depth_readout == camera.delay == 0:
         return None
     return Clocks(Clock(0.0, readout / seconds), Clock(camera.delay / seconds, depth_readout / seconds), before)

@@ -3,13 +3,13 @@
 from dataclasses import dataclass
 from typing import Any, Self
 
-import cv2
 import numpy as np
 
 from semslam.config import Config, Section, setting
 from semslam.frontend.direct.view import Level, contrast, make_levels
 from semslam.frontend.frame_to_frame.images import registered
 from semslam.frontend.frame_to_frame.reference import ReferenceOdometry, Registration
+from semslam.frontend.straight_images import straightened
 from semslam.geometry.camera import Intrinsics
 from semslam.geometry.se3 import adjoint, invert, is_rigid
 from semslam.runtime.threads import one_open3d_thread
@@ -59,24 +59,20 @@ class DenseRegistrar:
     def __init__(self, config: DenseConfig) -> None:
         self._config = config
 
-    def prepare(self, frame: Frame, velocity: FloatArray | None = None) -> DenseView | None:
-        """Undistort the images; None where they are tiny, black or nearly without depth.
-
-        Rows stay as they were read out: straightened images were tried, and register no better.
-        """
-        del velocity
-        depth = np.where((frame.depth > 0) & (frame.depth <= self._config.max_depth), frame.depth, 0).astype(np.float32)
-        if min(depth.shape) < MIN_SIZE or np.count_nonzero(depth) < self._config.min_coverage * depth.size:
+    def prepare(self, frame: Frame, velocity: FloatArray) -> DenseView | None:
+        """The images as of one instant, without distortion; None where they are tiny, black or nearly without depth."""
+        if min(frame.depth.shape) < MIN_SIZE or contrast(frame.color) < self._config.min_contrast:
             return None
-        if contrast(frame.color) < self._config.min_contrast:
+        still = straightened(frame, velocity)
+        usable = (still.depth > 0) & (still.depth <= self._config.max_depth)
+        if np.count_nonzero(usable) < self._config.min_coverage * usable.size:
             return None
         import open3d as o3d
 
-        color = frame.intrinsics.undistort_image(frame.color, cv2.INTER_LINEAR)
-        depth = frame.intrinsics.undistort_image(depth, cv2.INTER_NEAREST)
+        depth = np.where(usable, still.depth, 0).astype(np.float32)
         image, tensor = o3d.t.geometry.Image, o3d.core.Tensor.from_numpy
-        rgbd = o3d.t.geometry.RGBDImage(image(tensor(color.astype(np.float32) / 255.0)), image(tensor(depth)))
-        return DenseView(rgbd, frame.intrinsics, make_levels(frame))
+        rgbd = o3d.t.geometry.RGBDImage(image(tensor(still.color.astype(np.float32) / 255.0)), image(tensor(depth)))
+        return DenseView(rgbd, still.intrinsics, make_levels(still))
 
     def register(self, reference: DenseView, current: DenseView, T_ref_cam: Transform) -> Registration | None:
         """Register ``current`` to ``reference`` from an initial guess; None where too few pixels agree."""

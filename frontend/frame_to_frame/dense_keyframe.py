@@ -22,7 +22,7 @@ class _Registrar:
         self._features = FeatureRegistrar(config)
 
     def prepare(self, frame: Frame, velocity: FloatArray) -> _View | None:
-        dense = self._dense.prepare(frame)
+        dense = self._dense.prepare(frame, velocity)
         return None if dense is None else _View(dense, self._features.prepare(frame, velocity))
 
     def register(self, reference: _View, current: _View, T_ref_cam: Transform) -> Registration | None:

@@ -40,7 +40,7 @@ class FeatureRegistrar:
 
     def prepare(self, frame: Frame, velocity: FloatArray) -> FeatureView | None:
         """Find keypoints, as a global shutter would see them; None where there are too few, and hardly any depth."""
-        features = still(self._extractor.extract(frame), frame, velocity)
+        features = still(self._extractor.extract(frame), frame, velocity, self._extractor.config)
         if np.count_nonzero(features.depths) < self._config.min_inliers and _levels(frame) is None:
             return None
         return FeatureView(features, frame)

@@ -89,6 +89,10 @@ class Intrinsics:
         """The camera matrix K, (3, 3)."""
         return np.array([[self.fx, 0.0, self.cx], [0.0, self.fy, self.cy], [0.0, 0.0, 1.0]])
 
+    def depth_readout_beside(self, readout: float) -> float:
+        """Seconds from depth's first row to its last where colour's take ``readout``: as long, unless stated."""
+        return readout if self.depth_readout is None else self.depth_readout
+
     @property
     def is_distorted(self) -> bool:
         """Whether any distortion coefficient differs from zero."""

@@ -46,7 +46,7 @@ def test_one_instant_changes_nothing(velocity: FloatArray) -> None:
     frame = frame_of()
     features = FeatureExtractor(CONFIG).extract(frame)
     assert at_color(features, frame, velocity, 0.0, CONFIG) is features
-    rolling = replace(frame, intrinsics=replace(frame.intrinsics, readout=0.026))
+    rolling = replace(frame, intrinsics=replace(frame.intrinsics, readout=0.026, depth_readout=None))
     assert at_color(features, rolling, velocity, 0.026, CONFIG) is features
 
 

@@ -12,7 +12,7 @@ from semslam.features import lift
 from semslam.frontend.feature_map.odometry import FeatureMapOdometry
 from semslam.frontend.feature_map.readout import ReadoutEstimate
 from semslam.frontend.feature_map.settings import FeatureMapConfig
-from semslam.frontend.rolling_shutter import rectify, rectify_cloud, velocity_of
+from semslam.frontend.rolling_shutter import rectify, rectify_cloud, rectify_points, velocity_of
 from semslam.geometry.camera import Intrinsics
 from semslam.geometry.reprojection import measure
 from semslam.geometry.se3 import exp_so3, invert, make_transform, transform_points
@@ -69,7 +69,7 @@ def test_a_rectified_cloud_is_that_of_a_global_shutter(seed: int) -> None:
     points, velocity = world(seed)
     bent = rolling(points, velocity, 0.026).points
     normals = np.tile(np.float32([0.0, 0.0, -1.0]), (len(points), 1))
-    cloud = rectify_cloud(Cloud(bent, normals), CAMERA, velocity, 0.026)
+    cloud = rectify_cloud(Cloud(bent, normals), replace(CAMERA, readout=0.026), velocity)
     error = np.linalg.norm(cloud.points - points, axis=1)
     assert error.max() < 0.01
     assert error.mean() < 0.1 * np.linalg.norm(bent - points, axis=1).mean() + 1e-4
@@ -81,7 +81,17 @@ def test_no_readout_changes_nothing() -> None:
     features = features_of(CAMERA.project(points), points[:, 2])
     assert rectify(features, CAMERA, velocity, 0.0) is features
     cloud = Cloud(points.astype(np.float32), points.astype(np.float32))
-    assert rectify_cloud(cloud, CAMERA, velocity, 0.0) is cloud
+    assert rectify_cloud(cloud, CAMERA, velocity) is cloud
+
+
+def test_points_that_are_measured_later_move_by_what_the_camera_moves_meanwhile() -> None:
+    points, velocity = world(2)
+    T_now_later = make_transform(exp_so3(velocity[:3] * 0.01), velocity[3:] * 0.01)
+    measured = transform_points(invert(T_now_later), points)
+    late = replace(CAMERA, delay=0.01)
+    assert np.abs(rectify_points(measured, late, velocity) - points).max() < 0.001 < np.abs(measured - points).max()
+    with_rows = replace(late, readout=0.02, depth_readout=0.0)
+    assert np.array_equal(rectify_points(measured, with_rows, velocity), rectify_points(measured, late, velocity))
 
 
 def test_velocity_is_motion_by_time() -> None:

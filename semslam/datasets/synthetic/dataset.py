@@ -54,7 +54,7 @@ class Request(Section):
     depth_readout: float = Field(0.0, ge=0, le=0.1, description="seconds from depth's first row to its last")
     delay: float = Field(0.0, ge=-0.1, le=0.1, description="seconds by which depth is taken after colour")
     depth_factor: float = Field(1.0, ge=0.5, le=2, description="measured depth divided by the true one")
-    stated: bool = Field(True, description="whether the camera states its read-out")
+    stated: bool = Field(True, description="whether the camera states its timing")
 
     @field_validator("light")
     @classmethod
@@ -136,8 +136,11 @@ class SyntheticDataset:
         """A Kinect-like pinhole without distortion."""
         width, height = self._request.width, self._request.width * 3 // 4
         focal = FIELD_OF_VIEW * width
-        readout = self._request.readout if self._request.stated else None
-        return Intrinsics(width, height, focal, focal, (width - 1) / 2, (height - 1) / 2, readout=readout)
+        camera = Intrinsics(width, height, focal, focal, (width - 1) / 2, (height - 1) / 2)
+        request = self._request
+        if not request.stated:
+            return camera
+        return replace(camera, readout=request.readout, delay=request.delay, depth_readout=request.depth_readout)
 
     @cached_property
     def timestamps(self) -> list[float]:
