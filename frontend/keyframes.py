@@ -7,7 +7,7 @@ import numpy as np
 
 from semslam.config import Config, KeyframeConfig
 from semslam.features import FeatureExtractor
-from semslam.frontend.moving import make_movers, standing_at
+from semslam.frontend.moving.movers import make_movers, standing_at
 from semslam.frontend.rolling_shutter import still, still_cloud, velocity_of
 from semslam.frontend.surface import make_cloud
 from semslam.geometry.se3 import Transform, invert, orthonormalise, rotation_angle

@@ -19,7 +19,7 @@ from semslam.frontend.feature_map.mapping import Mapper
 from semslam.frontend.feature_map.readout import ReadoutEstimate
 from semslam.frontend.feature_map.relocalisation import match_and_solve, relocalise
 from semslam.frontend.feature_map.settings import FeatureMapConfig
-from semslam.frontend.moving import make_movers
+from semslam.frontend.moving.movers import make_movers
 from semslam.frontend.prediction import ConstantVelocity, check_frame, first_motion, wide_covariance
 from semslam.frontend.rolling_shutter import rectify, velocity_of
 from semslam.geometry.reprojection import measure

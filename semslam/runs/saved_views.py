@@ -7,7 +7,7 @@ from pathlib import Path
 from semslam.datasets import open_dataset
 from semslam.datasets.dataset import Dataset
 from semslam.errors import DatasetError, ResultsError
-from semslam.frontend.moving import make_movers, standing_at
+from semslam.frontend.moving.movers import make_movers, standing_at
 from semslam.maps.views import PosedView
 from semslam.runs.recording import Recording, read_front_end
 from semslam.runs.results import SavedRun, read_run

@@ -5,31 +5,26 @@ surface that another hid, or that nobody looked at, is not judged.
 """
 
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Protocol
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
 from semslam.config import DynamicsConfig
+from semslam.frontend.moving.cells import BoolArray, CellGrid
 from semslam.frontend.rolling_shutter import rectify_points, velocity_of
 from semslam.geometry.camera import Intrinsics
 from semslam.geometry.se3 import invert
-from semslam.types import Features, Float32Array, FloatArray, Frame, Points3, Transform
+from semslam.types import Features, Float32Array, FloatArray, Frame, Transform
 
-BoolArray = npt.NDArray[np.bool_]
-CELLS = 80
-"""Cells along an image's width, in each of which one pixel is looked at."""
 SPACING, MEMORY = 0.15, 6
 """Seconds between the frames that are remembered, and how many: a person moves by a body's width meanwhile."""
 STAMP_TOLERANCE = 1e-3
-TOLERANCE, TOLERANCE_SHARE = 0.08, 0.04
-"""Metres, and share of the depth, by which a surface must stand in front of what was seen before."""
 SETTLED = 0.5
 """Seconds after which a surface that is where it was counts as standing: a person overlaps themselves for a while."""
-NEAREST = 0.05
 AROUND = np.ones((3, 3), dtype=np.uint8)
 SMALLEST = 3
 """Cells along each side that what moves fills at the least."""
@@ -117,57 +112,58 @@ class FreeSpaceMovers:
 
     def find(self, frame: Frame, T_map_cam: Transform, map_id: int) -> None:
         """See ``Movers``."""
-        grid = _grid_of(frame.intrinsics)
-        z = grid.thinned(frame.depth)
-        known = z > 0
         self._moves = None
-        # What moves fills so many rows and columns that one cell of each is enough to exclude it.
-        sparse = np.zeros_like(known)
-        sparse[::SMALLEST, ::SMALLEST] = known[::SMALLEST, ::SMALLEST]
         place = _Placed(frame.timestamp, T_map_cam, map_id)
-        if not self._compared(grid, grid.points(z, sparse), place)[0].any():
+        before = [seen for seen in self._seen if seen.map_id == map_id]
+        if not before:
             return
-        moved, stood = np.zeros((2, *z.shape), dtype=bool)
-        moved[known], stood[known] = self._compared(grid, grid.points(z, known), place)
+        sparse, full = _grids_of(frame.intrinsics)
+        # What moves fills so many rows and columns that one cell of each is enough to exclude it.
+        if not self._compared(sparse, sparse.depths(frame.depth), place, before)[0].any():
+            return
+        z = full.depths(frame.depth)
+        known = z > 0
+        moved, stood = self._compared(full, z, place, before)
         block = np.ones((SMALLEST, SMALLEST), dtype=np.uint8)
         seeds = cv2.morphologyEx(moved.astype(np.uint8), cv2.MORPH_OPEN, block) > 0
         if not seeds.any():
             return
         self._moves = _grown(_grown(seeds, known & (moved | ~stood), z), known, z, RIM)
 
-    def _compared(self, grid: "_Grid", points: Points3, place: _Placed) -> tuple[BoolArray, BoolArray]:
-        """Whether points (N, 3) of a frame fill what was seen to be free, and whether they were there long before."""
+    def _compared(
+        self, grid: CellGrid, z: Float32Array, place: _Placed, before: Sequence[_Seen]
+    ) -> tuple[BoolArray, BoolArray]:
+        """Cells (rows, columns) that fill what was seen to be free, and those that were as they are long before."""
+        known = z > 0
         velocity = np.zeros(6) if self._last is None else self._last.velocity(place)
-        still = rectify_points(points, grid.camera, velocity).astype(np.float32)
-        moved, stood = np.zeros((2, len(points)), dtype=bool)
-        for seen in self._seen:
-            if seen.map_id == place.map_id:
-                ahead, same = grid.compared(still, seen.T_cam_map @ place.T_map_cam, seen.nearest)
-                moved |= ahead
-                if place.timestamp - seen.timestamp > SETTLED:
-                    stood |= same
+        points = rectify_points(grid.points(z, known), grid.camera, velocity)
+        T_seen_cam = np.stack([seen.T_cam_map for seen in before]) @ place.T_map_cam
+        ahead, same = grid.compared(points, T_seen_cam, np.stack([seen.nearest for seen in before]))
+        settled = np.array([place.timestamp - seen.timestamp > SETTLED for seen in before])
+        moved, stood = np.zeros((2, *z.shape), dtype=bool)
+        moved[known], stood[known] = ahead.any(0), same[settled].any(0)
         return moved, stood
 
     def standing(self, frame: Frame) -> Frame:
         """See ``Movers``."""
         if self._moves is None:
             return frame
-        mask = self._moves.ravel()[_grid_of(frame.intrinsics).cell_of_pixel]
+        mask = self._moves.ravel()[_grids_of(frame.intrinsics)[1].cell_of_pixel]
         return replace(frame, depth=np.where(mask, np.float32(0), frame.depth))
 
     def standing_features(self, features: Features, camera: Intrinsics) -> Features:
         """See ``Movers``."""
         if self._moves is None:
             return features
-        return features.take(~self._moves.ravel()[_grid_of(camera).cells(features.pixels)])
+        return features.take(~self._moves.ravel()[_grids_of(camera)[1].cells(features.pixels)])
 
     def remember(self, frame: Frame, T_map_cam: Transform, map_id: int) -> None:
         """See ``Movers``."""
         before, self._last = self._last, _Placed(frame.timestamp, T_map_cam, map_id)
         if self._seen and frame.timestamp - self._seen[-1].timestamp < SPACING - STAMP_TOLERANCE:
             return
-        grid = _grid_of(frame.intrinsics)
-        z = grid.thinned(frame.depth)
+        grid = _grids_of(frame.intrinsics)[1]
+        z = grid.depths(frame.depth)
         still = z if self._moves is None else np.where(self._moves, np.float32(0), z)
         turning = np.zeros(6) if before is None else before.velocity(self._last)
         nearest = np.asarray(cv2.erode(still, AROUND, iterations=1 + grid.bent(turning)), dtype=np.float32)
@@ -186,76 +182,15 @@ def standing_at(movers: Movers, frame: Frame, T_map_cam: Transform, map_id: int 
     return movers.standing(frame)
 
 
-class _Grid:
-    """Cells of an image without distortion, and which pixels of the raw one belong to them.
-
-    Attributes:
-        camera: with its distortion.
-        rays: (rows, columns, 3) through the middle of each cell, with z = 1.
-        cell_of_pixel: (H, W) flat index of the cell in which each raw pixel lies, the nearest for those beyond all.
-    """
-
-    def __init__(self, camera: Intrinsics) -> None:
-        self.camera = camera
-        self._step = step = max(camera.width // CELLS, 1)
-        self._scale_u, self._scale_v, self._middle_u, self._middle_v = (
-            np.float32(value / step) for value in (camera.fx, camera.fy, camera.cx, camera.cy)
-        )
-        u, v = np.meshgrid(np.arange(step // 2, camera.width, step), np.arange(step // 2, camera.height, step))
-        x, y = (u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy
-        self.rays = np.dstack([x, y, np.ones(u.shape)]).astype(np.float32)
-        raw = np.rint(camera.distort_pixels(np.column_stack([u.ravel(), v.ravel()]))).astype(np.int64)
-        self._within = ((raw >= 0) & (raw < (camera.width, camera.height))).all(1).reshape(u.shape)
-        self._raw_u, self._raw_v = np.where(self._within, raw.T.reshape(2, *u.shape), 0)
-        rays = camera.rays().reshape(-1, 2) * (camera.fx, camera.fy) + (camera.cx, camera.cy)
-        self.cell_of_pixel = self.cells(rays).reshape(camera.height, camera.width)
-
-    def bent(self, velocity: FloatArray) -> int:
-        """Cells by which the first and last rows are off at a velocity (6,)."""
-        camera = self.camera
-        late = abs(camera.delay) + 0.5 * camera.depth_readout_beside(camera.readout or 0.0)
-        return round(float(np.linalg.norm(velocity[:3])) * late * camera.fy / self._step)
-
-    def thinned(self, depth: Float32Array) -> Float32Array:
-        """Depth (rows, columns) in the middle of each cell; 0 = not known."""
-        z = depth[self._raw_v, self._raw_u]
-        return np.where(self._within & np.isfinite(z), z, np.float32(0))
-
-    def points(self, depth: Float32Array, chosen: BoolArray) -> Points3:
-        """Points (N, 3) in metres of chosen cells with these depths (both rows, columns)."""
-        return np.asarray(self.rays[chosen] * depth[chosen, None], dtype=np.float64)
-
-    def cells(self, pixels: npt.NDArray[np.floating]) -> npt.NDArray[np.int64]:
-        """Flat index (N,) of the cells of undistorted pixels (N, 2), the nearest ones for those beyond the image."""
-        rows, columns = self.rays.shape[:2]
-        u, v = np.clip(pixels.T // self._step, 0, [[columns - 1], [rows - 1]]).astype(np.int64)
-        return np.asarray(v * columns + u)
-
-    def compared(
-        self, points: Float32Array, T_seen_cam: Transform, nearest: Float32Array
-    ) -> tuple[BoolArray, BoolArray]:
-        """Whether points (N, 3) stand in front of what was seen in their direction, and whether they are what was."""
-        R, t = T_seen_cam[:3, :3].astype(np.float32), T_seen_cam[:3, 3].astype(np.float32)
-        x, y, depth = R @ points.T + t[:, None]
-        ahead = np.maximum(depth, np.float32(NEAREST))
-        rows, columns = nearest.shape
-        u, v = self._scale_u * x / ahead + self._middle_u, self._scale_v * y / ahead + self._middle_v
-        inside = (depth > NEAREST) & (u >= 0) & (u < columns) & (v >= 0) & (v < rows)
-        cells = np.where(inside, v, 0).astype(np.int32) * columns + np.where(inside, u, 0).astype(np.int32)
-        before = np.where(inside, nearest.ravel()[cells], np.float32(0))
-        tolerance = TOLERANCE + TOLERANCE_SHARE * before
-        known = before > 0
-        return known & (ahead < before - tolerance), known & (np.abs(ahead - before) <= tolerance)
-
-
 @lru_cache(maxsize=4)
-def _grid_of(camera: Intrinsics) -> _Grid:
-    return _Grid(camera)
+def _grids_of(camera: Intrinsics) -> tuple[CellGrid, CellGrid]:
+    """A grid of every ``SMALLEST``-th cell, and that of all."""
+    return CellGrid(camera, SMALLEST), CellGrid(camera)
 
 
-def _grown(cells: BoolArray, allowed: BoolArray, z: Float32Array, steps: int = CELLS) -> BoolArray:
-    """Cells, and those that are allowed beside them on the same surface, for a number of steps."""
-    for _ in range(steps):
+def _grown(cells: BoolArray, allowed: BoolArray, z: Float32Array, steps: int | None = None) -> BoolArray:
+    """Cells, and allowed ones beside them on the same surface, for a number of steps; None = as far as it goes."""
+    for _ in range(max(z.shape) if steps is None else steps):
         around = np.asarray(cv2.dilate(np.where(cells, z, np.float32(0)), AROUND))
         more = cells | (allowed & (around > 0) & (np.abs(z - around) < SAME_SURFACE * around))
         if np.array_equal(more, cells):

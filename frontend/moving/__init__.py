@@ -1,0 +1,1 @@
+"""What moves is found by the space it fills, and left out."""
