@@ -137,8 +137,9 @@ class KeyframeBuilder:
 
     def build(self, frame: Frame) -> Keyframe:
         """Make the newest frame a keyframe."""
-        self._last = self._pose
-        return self.build_at(frame, self._pose.T_odom_cam, self._pose.map_id, self._velocity)
+        self._last = pose = self._pose
+        standing = standing_at(self._movers, frame, pose.T_odom_cam, pose.map_id)
+        return self._made(standing, pose.T_odom_cam, pose.map_id, self._velocity)
 
     def standing(self, frame: Frame) -> Frame:
         """The frame of the newest keyframe without depth where something moves."""
@@ -150,9 +151,14 @@ class KeyframeBuilder:
         """Make a frame whose pose is known from elsewhere a keyframe: features and a thinned cloud stay, no images.
 
         Keyframes are numbered from 0 in the order in which they are built. Where the camera's velocity is known, what a
-        rolling shutter has bent is straightened by it. What moves is left out.
+        rolling shutter has bent is straightened by it. What moves is left out, but nothing where the pose does not fit
+        the keyframe before.
         """
-        frame = standing_at(self._movers, frame, T_odom_cam, map_id)
+        return self._made(
+            standing_at(self._movers, frame, T_odom_cam, map_id, is_sure=False), T_odom_cam, map_id, velocity
+        )
+
+    def _made(self, frame: Frame, T_odom_cam: Transform, map_id: int, velocity: FloatArray | None) -> Keyframe:
         features = self._movers.standing_features(self._extractor.extract(frame), frame.intrinsics)
         keyframe = Keyframe(
             id=self._count,

@@ -1,5 +1,6 @@
 """Depth of an image in the cells of a grid, and how it fits what other images saw."""
 
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -14,6 +15,21 @@ CELLS = 80
 TOLERANCE, TOLERANCE_SHARE = 0.08, 0.04
 """Metres, and share of the depth, by which a surface must stand in front of what was seen before."""
 NEAREST = 0.05
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Fit:
+    """How N points fit what K images saw in their direction, all (K, N).
+
+    Attributes:
+        known: the image saw something there.
+        ahead: they stand in front of it.
+        same: they are what was seen.
+    """
+
+    known: BoolArray
+    ahead: BoolArray
+    same: BoolArray
 
 
 class CellGrid:
@@ -67,16 +83,13 @@ class CellGrid:
         late = abs(camera.delay) + 0.5 * camera.depth_readout_beside(camera.readout or 0.0)
         return round(float(np.linalg.norm(velocity[:3])) * late * camera.fy / self._step)
 
-    def compared(self, points: Points3, T_seen_cam: Transforms, nearest: Float32Array) -> tuple[BoolArray, BoolArray]:
-        """Whether points stand in front of what K images saw in their direction, and whether they are what was seen.
+    def compared(self, points: Points3, T_seen_cam: Transforms, nearest: Float32Array) -> Fit:
+        """How points fit what images saw.
 
         Args:
             points: (N, 3) metres.
             T_seen_cam: (K, 4, 4) from their camera to those of the images.
             nearest: (K, rows, columns) depths of the images in all cells; 0 = not known.
-
-        Returns:
-            Two arrays (K, N).
         """
         camera, step = self.camera, self._step
         images, rows, columns = nearest.shape
@@ -90,4 +103,4 @@ class CellGrid:
         before = np.where(inside, np.take_along_axis(nearest.reshape(images, -1), cells, axis=1), np.float32(0))
         tolerance = TOLERANCE + TOLERANCE_SHARE * before
         known = before > 0
-        return known & (ahead < before - tolerance), known & (np.abs(ahead - before) <= tolerance)
+        return Fit(known, known & (ahead < before - tolerance), known & (np.abs(ahead - before) <= tolerance))

@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 
 from semslam.config import DynamicsConfig
-from semslam.frontend.moving.cells import BoolArray, CellGrid
+from semslam.frontend.moving.cells import BoolArray, CellGrid, Fit
 from semslam.frontend.rolling_shutter import rectify_points, velocity_of
 from semslam.geometry.camera import Intrinsics
 from semslam.geometry.se3 import invert
@@ -23,6 +23,10 @@ from semslam.types import Features, Float32Array, FloatArray, Frame, Transform
 SPACING, MEMORY = 0.15, 6
 """Seconds between the frames that are remembered, and how many: a person moves by a body's width meanwhile."""
 STAMP_TOLERANCE = 1e-3
+OLDEST = 3.0
+"""Seconds after which a frame is too old: what has changed since need not move."""
+FITTING, MOVING = 0.6, 0.5
+"""Where a pose may be wrong: share of a frame that must be what the one before saw, and that may move at the most."""
 SETTLED = 0.5
 """Seconds after which a surface that is where it was counts as standing: a person overlaps themselves for a while."""
 AROUND = np.ones((3, 3), dtype=np.uint8)
@@ -37,8 +41,15 @@ SAME_SURFACE = 0.05
 class Movers(Protocol):
     """Finds what moves in each frame, and takes it out."""
 
-    def find(self, frame: Frame, T_map_cam: Transform, map_id: int) -> None:
-        """Find it in a frame at a pose (4, 4) of a map, which may be a few centimetres off."""
+    def find(self, frame: Frame, T_map_cam: Transform, map_id: int, is_sure: bool = True) -> None:
+        """Find it in a frame.
+
+        Args:
+            frame: its images.
+            T_map_cam: (4, 4) its pose in a map, which may be a few centimetres off.
+            map_id: the map of that pose.
+            is_sure: False = the pose may be wrong altogether; nothing moves then where most of the frame would.
+        """
 
     def standing(self, frame: Frame) -> Frame:
         """The frame without depth where something moves."""
@@ -53,7 +64,7 @@ class Movers(Protocol):
 class NoMovers:
     """Nothing moves."""
 
-    def find(self, frame: Frame, T_map_cam: Transform, map_id: int) -> None:
+    def find(self, frame: Frame, T_map_cam: Transform, map_id: int, is_sure: bool = True) -> None:
         """Nothing to find."""
 
     def standing(self, frame: Frame) -> Frame:
@@ -110,39 +121,38 @@ class FreeSpaceMovers:
         self._last: _Placed | None = None
         self._moves: BoolArray | None = None
 
-    def find(self, frame: Frame, T_map_cam: Transform, map_id: int) -> None:
+    def find(self, frame: Frame, T_map_cam: Transform, map_id: int, is_sure: bool = True) -> None:
         """See ``Movers``."""
         self._moves = None
         place = _Placed(frame.timestamp, T_map_cam, map_id)
-        before = [seen for seen in self._seen if seen.map_id == map_id]
+        before = [each for each in self._seen if each.map_id == map_id and frame.timestamp - each.timestamp <= OLDEST]
         if not before:
             return
         sparse, full = _grids_of(frame.intrinsics)
+        fit = self._fit(sparse, sparse.depths(frame.depth), place, before)
         # What moves fills so many rows and columns that one cell of each is enough to exclude it.
-        if not self._compared(sparse, sparse.depths(frame.depth), place, before)[0].any():
+        if not fit.ahead.any() or (not is_sure and fit.same[-1].sum() < FITTING * fit.known[-1].sum()):
             return
         z = full.depths(frame.depth)
         known = z > 0
-        moved, stood = self._compared(full, z, place, before)
+        fit = self._fit(full, z, place, before)
+        settled = np.array([frame.timestamp - seen.timestamp > SETTLED for seen in before])
+        moved, stood = np.zeros((2, *z.shape), dtype=bool)
+        moved[known], stood[known] = fit.ahead.any(0), fit.same[settled].any(0)
         block = np.ones((SMALLEST, SMALLEST), dtype=np.uint8)
         seeds = cv2.morphologyEx(moved.astype(np.uint8), cv2.MORPH_OPEN, block) > 0
         if not seeds.any():
             return
-        self._moves = _grown(_grown(seeds, known & (moved | ~stood), z), known, z, RIM)
+        moves = _grown(_grown(seeds, known & (moved | ~stood), z), known, z, RIM)
+        if is_sure or moves.sum() <= MOVING * known.sum():
+            self._moves = moves
 
-    def _compared(
-        self, grid: CellGrid, z: Float32Array, place: _Placed, before: Sequence[_Seen]
-    ) -> tuple[BoolArray, BoolArray]:
-        """Cells (rows, columns) that fill what was seen to be free, and those that were as they are long before."""
-        known = z > 0
+    def _fit(self, grid: CellGrid, z: Float32Array, place: _Placed, before: Sequence[_Seen]) -> Fit:
+        """How the cells that have depth fit what frames before saw."""
         velocity = np.zeros(6) if self._last is None else self._last.velocity(place)
-        points = rectify_points(grid.points(z, known), grid.camera, velocity)
+        points = rectify_points(grid.points(z, z > 0), grid.camera, velocity)
         T_seen_cam = np.stack([seen.T_cam_map for seen in before]) @ place.T_map_cam
-        ahead, same = grid.compared(points, T_seen_cam, np.stack([seen.nearest for seen in before]))
-        settled = np.array([place.timestamp - seen.timestamp > SETTLED for seen in before])
-        moved, stood = np.zeros((2, *z.shape), dtype=bool)
-        moved[known], stood[known] = ahead.any(0), same[settled].any(0)
-        return moved, stood
+        return grid.compared(points, T_seen_cam, np.stack([seen.nearest for seen in before]))
 
     def standing(self, frame: Frame) -> Frame:
         """See ``Movers``."""
@@ -175,9 +185,9 @@ def make_movers(config: DynamicsConfig) -> Movers:
     return FreeSpaceMovers() if config.free_space else NoMovers()
 
 
-def standing_at(movers: Movers, frame: Frame, T_map_cam: Transform, map_id: int = 0) -> Frame:
-    """A frame whose pose is known without depth where something moves; it is remembered for those after it."""
-    movers.find(frame, T_map_cam, map_id)
+def standing_at(movers: Movers, frame: Frame, T_map_cam: Transform, map_id: int = 0, is_sure: bool = True) -> Frame:
+    """A frame at a pose without depth where something moves, see ``find``; it is remembered for those after it."""
+    movers.find(frame, T_map_cam, map_id, is_sure)
     movers.remember(frame, T_map_cam, map_id)
     return movers.standing(frame)
 

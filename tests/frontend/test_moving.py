@@ -79,7 +79,7 @@ def test_frames_without_depth_are_as_they_were(depth: float) -> None:
     blind = Frame(20, seen.timestamp, seen.color, np.full_like(seen.depth, depth), seen.intrinsics)
     for _ in range(2):
         assert standing_at(movers, blind, np.eye(4)) is blind
-    assert standing_at(movers, seen, np.eye(4)) is seen
+    assert standing_at(movers, seen, np.eye(4), is_sure=False) is seen
 
 
 def test_keyframes_hold_no_person() -> None:
@@ -119,3 +119,22 @@ def test_what_moves_is_found_through_a_lens_with_distortion() -> None:
         standing = standing_at(movers, replace(seen, intrinsics=lens), dataset.ground_truth.poses[index])
     found, person = standing.depth == 0, dataset.labels(index) == labels.PERSON
     assert (found & person).sum() > 0.7 * (person & (seen.depth > 0)).sum()
+
+
+def test_a_wrong_pose_is_no_motion() -> None:
+    dataset, movers = small(people=0), FreeSpaceMovers()
+    for index in range(0, 120, 8):
+        seen = dataset.frame(index)
+        assert standing_at(movers, seen, np.eye(4), is_sure=False) is seen
+
+
+def test_what_changed_long_ago_is_no_motion() -> None:
+    dataset, movers = small(people=1), FreeSpaceMovers()
+    poses = dataset.ground_truth.poses
+    standing_at(movers, dataset.frame(16), poses[16])
+    later = replace(dataset.frame(24), timestamp=dataset.timestamps[16] + 4.0)
+    assert standing_at(movers, later, poses[24]) is later
+    movers = FreeSpaceMovers()
+    standing_at(movers, dataset.frame(16), poses[16])
+    soon = dataset.frame(24)
+    assert standing_at(movers, soon, poses[24]) is not soon
