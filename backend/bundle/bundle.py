@@ -11,6 +11,7 @@ import gtsam
 import numpy as np
 import numpy.typing as npt
 
+from semslam.backend.bundle.held_out import HeldOut, choose, compare
 from semslam.backend.bundle.observations import ObservationTable, reprojection_errors, spread, thinned
 from semslam.backend.graph.checks import checked_pose
 from semslam.backend.graph.factors import (
@@ -56,11 +57,13 @@ class BundleResult:
         poses: (4, 4) T_world_cam of every keyframe that was given.
         rounds: what each adjustment did; none where no landmark is seen often enough, or none is wanted.
         landmarks: how many landmarks were adjusted.
+        held_out: what observations that took no part say; None where they are too few.
     """
 
     poses: dict[int, Transform]
     rounds: tuple[BundleRound, ...]
     landmarks: int
+    held_out: HeldOut | None = None
 
 
 def adjust(
@@ -72,7 +75,8 @@ def adjust(
 ) -> BundleResult:
     """Adjust keyframes and landmarks together; the first keyframe stays where it is.
 
-    Keyframes whose observations are too many to take part are held by ``edges`` alone.
+    Some observations take no part, and say afterwards whether the poses have become better. Keyframes whose
+    observations are too many to take part are held by ``edges`` alone.
 
     Args:
         poses: (4, 4) T_world_cam to start from, by key.
@@ -96,7 +100,8 @@ def adjust(
         values.insert(gtsam.symbol("l", landmark), point)
     factors = _observation_factors(observed, intrinsics, config)
     held = _pose_factors(poses, edges, config.observation_share)
-    kept = np.ones(len(observed), dtype=bool)
+    held_out = choose(observed)
+    kept = ~held_out
     rounds = []
     for _ in range(config.rounds):
         values = _adjusted(held, factors, kept, values, config.iterations)
@@ -106,7 +111,10 @@ def adjust(
         dropped = int((kept & ~inside).sum())
         rounds.append(BundleRound(int(kept.sum()), dropped, _rmse(errors[kept & inside])))
         kept &= inside
-    return BundleResult(read_poses(values, poses), tuple(rounds), len(observed.points))
+    adjusted = read_poses(values, poses)
+    weights = np.array([1.0, 1.0, config.disparity_weight]) / config.pixel_sigma**2
+    verdict = compare(observed, held_out, poses, adjusted, intrinsics, config.baseline, weights)
+    return BundleResult(adjusted, tuple(rounds), len(observed.points), verdict)
 
 
 def _adjusted(
@@ -133,8 +141,9 @@ def _observation_factors(
 ) -> list[gtsam.NonlinearFactor]:
     camera = (intrinsics.fx, intrinsics.fy, 0.0, intrinsics.cx, intrinsics.cy)
     stereo, mono = gtsam.Cal3_S2Stereo(*camera, config.baseline), gtsam.Cal3_S2(*camera)
-    noises = {sigma: _noises(sigma, config) for sigma in np.unique(observed.sigmas).tolist()}
-    sigmas = observed.sigmas.tolist()
+    # Views of a landmark repeat its errors, so that together they count as one.
+    sigmas = (observed.sigmas * np.sqrt(np.bincount(observed.landmarks))[observed.landmarks]).tolist()
+    noises = {sigma: _noises(sigma, config) for sigma in set(sigmas)}
     right = observed.right_u(intrinsics, config.baseline).tolist()
     keys, landmarks = observed.keys.tolist(), observed.landmarks.tolist()
     factors: list[gtsam.NonlinearFactor] = []

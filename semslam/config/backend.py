@@ -14,8 +14,8 @@ class BundleConfig(Section):
     )
     pixel_sigma: float = setting(1.0, "standard deviation of a keypoint's position", unit="px", gt=0)
     observation_share: float = setting(
-        0.0625,
-        "information of an observation, whose errors correlate, relative to an independent one",
+        0.125,
+        "information of all observations of a landmark, whose errors are alike, relative to one alone",
         gt=0,
         le=1,
     )

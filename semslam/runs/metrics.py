@@ -93,6 +93,22 @@ class SensorMetrics(_Record):
     used_readout_ms: float
 
 
+class HeldOutMetrics(_Record):
+    """What observations that took no part in the last adjustment say of it.
+
+    Attributes:
+        observations: how many.
+        before_px: their mean error at the poses of the pose graph.
+        after_px: likewise at the adjusted poses.
+        kept: whether the run ends with these.
+    """
+
+    observations: int
+    before_px: float
+    after_px: float
+    kept: bool
+
+
 class Metrics(_Record):
     """All metrics of one run.
 
@@ -118,6 +134,7 @@ class Metrics(_Record):
         error: what stopped it, where that was an error.
         realtime: of a run in real time; None of all others, which give the same result each time.
         sensor: what was estimated of a camera that states no read-out; None of all others.
+        held_out: how the last adjustment was judged; None where there was none, or too little to judge it by.
     """
 
     sequence: str
@@ -141,3 +158,4 @@ class Metrics(_Record):
     error: str | None = None
     realtime: RealTimeMetrics | None = None
     sensor: SensorMetrics | None = None
+    held_out: HeldOutMetrics | None = None

@@ -14,7 +14,7 @@ from semslam.eval.metrics import TrajectoryMetrics
 from semslam.eval.trajectory import coverage, score_trajectory
 from semslam.runs.contributions import loop_contributions
 from semslam.runs.ledger import rejected_entry, verified_entry
-from semslam.runs.metrics import LoopMetrics, Metrics, RealTimeMetrics, SensorMetrics, TimeMetrics
+from semslam.runs.metrics import HeldOutMetrics, LoopMetrics, Metrics, RealTimeMetrics, SensorMetrics, TimeMetrics
 from semslam.system.result import FrameState, SlamResult
 from semslam.types import (
     JudgedLoop,
@@ -84,8 +84,18 @@ def score_run(
         error=error,
         realtime=realtime,
         sensor=sensor,
+        held_out=_held_out(slam),
     )
     return Scores(odometry, live, trajectory, ledger, metrics)
+
+
+def _held_out(slam: SlamResult) -> HeldOutMetrics | None:
+    found = slam.held_out
+    if found is None:
+        return None
+    return HeldOutMetrics(
+        observations=found.observations, before_px=found.before, after_px=found.after, kept=not found.is_worse
+    )
 
 
 def lost_intervals(frames: Sequence[FrameState]) -> list[tuple[float, float]]:

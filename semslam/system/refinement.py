@@ -1,12 +1,13 @@
 """The last step of a run: bundle adjustment of keyframes and the landmarks that they share."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
 from semslam.backend.bundle.bundle import adjust
+from semslam.backend.bundle.held_out import HeldOut
 from semslam.backend.bundle.tracks import MatchedFeatures, join_tracks
 from semslam.backend.pose_graph import GraphSolution
 from semslam.config import Config
@@ -17,10 +18,23 @@ SEEN_TWICE = {"min_views": 2}
 """Features that closures share are no part of odometry, so that two views of one already add information."""
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Refinement:
+    """What became of a solution.
+
+    Attributes:
+        solution: the one to go on with.
+        held_out: what observations that took no part say of the adjustment; None where there was none, or are too few.
+    """
+
+    solution: GraphSolution
+    held_out: HeldOut | None = None
+
+
 def refine(
     solution: GraphSolution, keyframes: Sequence[Keyframe], observations: Mapping[int, Observations], config: Config
-) -> GraphSolution:
-    """The solution with its poses after bundle adjustment.
+) -> Refinement:
+    """The solution with its poses after bundle adjustment, where these predict observations held out better.
 
     The landmarks are those that the odometry keeps. One that keeps none, such as ICP, gets them from its closures:
     the features on which the accepted loops rest, and those that a keyframe shares with the one before it. Without
@@ -37,17 +51,20 @@ def refine(
     """
     settings = config.backend.bundle
     if not (settings.rounds and solution.loops):
-        return solution
+        return Refinement(solution)
     if not observations:
         if not settings.closures:
-            return solution
+            return Refinement(solution)
         observations = _shared(solution, keyframes, config)
         settings = settings.model_copy(update=SEEN_TWICE)
     edges = (*solution.odometry, *solution.loops, *solution.covisible)
     camera = keyframes[0].intrinsics
     observations = {key: _as_seen_by(camera, keyframes[key].intrinsics, seen) for key, seen in observations.items()}
     result = adjust(solution.poses, observations, camera, settings, edges)
-    return replace(solution, poses=result.poses)
+    held_out = result.held_out
+    if held_out is not None and held_out.is_worse:
+        return Refinement(solution, held_out)
+    return Refinement(replace(solution, poses=result.poses), held_out)
 
 
 def _as_seen_by(camera: Intrinsics, own: Intrinsics, seen: Observations) -> Observations:

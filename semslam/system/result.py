@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from semslam.backend.bundle.held_out import HeldOut
 from semslam.backend.pose_graph import GraphSolution
 from semslam.types import (
     FloatArray,
@@ -60,6 +61,7 @@ class SlamResult:
         poses: (N, 4, 4) optimised T_world_cam of every frame.
         components: for each frame the map it ends in, 0 the largest; maps that a loop joined share a number.
         live_loops: match and query of the loops that the live graph follows at the end.
+        held_out: what observations that took no part in the adjustment say of it, where there are enough.
         notes: what could not be done, a sentence each.
     """
 
@@ -71,6 +73,7 @@ class SlamResult:
     poses: Transforms
     components: tuple[int, ...]
     live_loops: frozenset[tuple[int, int]] = frozenset()
+    held_out: HeldOut | None = None
     notes: tuple[str, ...] = ()
 
     @property

@@ -184,12 +184,19 @@ class Slam:
         with self._stopwatch.stage("optimize"):
             solution = self._graph.optimize()
         graph_poses = self._recover(solution)
-        notes = []
+        notes: list[str] = []
+        held_out = None
         with self._stopwatch.stage("bundle"):
             try:
-                solution = refine(solution, self._keyframes, self._observations, self._config)
+                refinement = refine(solution, self._keyframes, self._observations, self._config)
+                solution, held_out = refinement.solution, refinement.held_out
             except GraphError as error:
                 notes.append(f"{error} The poses are those of the pose graph.")
+        if held_out is not None and held_out.is_worse:
+            notes.append(
+                f"The last adjustment was undone: the error of {held_out.observations} observations held out rose "
+                f"from {held_out.before:.3f} to {held_out.after:.3f} px. The poses are those of the pose graph."
+            )
         component_of = solution.component_of
         components = {keyframe.map_id: component_of[keyframe.id] for keyframe in self._keyframes}
         unplaced = len(solution.components)
@@ -202,6 +209,7 @@ class Slam:
             poses=self._recover(solution),
             components=tuple(components.get(state.map_id, unplaced) for state in self._frames),
             live_loops=frozenset(self._live_loops),
+            held_out=held_out,
             notes=tuple(notes),
         )
 

@@ -2,10 +2,12 @@
 
 from dataclasses import replace
 
+import gtsam
 import numpy as np
 import pytest
 
 from semslam.backend.analysis.simulation import measure_odometry, noisy, ring
+from semslam.backend.bundle import bundle
 from semslam.backend.pose_graph import GraphSolution, PoseGraph
 from semslam.config import Config
 from semslam.geometry.camera import Intrinsics
@@ -84,10 +86,10 @@ def test_shared_features_make_the_poses_more_accurate(
     two_laps: tuple[FloatArray, list[Keyframe], GraphSolution],
 ) -> None:
     truth, keyframes, solution = two_laps
-    refined = refine(solution, keyframes, {}, CONFIG)
+    refined = refine(solution, keyframes, {}, CONFIG).solution
     assert error(refined, truth) < 0.5 * error(solution, truth)
     assert refined.verdicts == solution.verdicts
-    again = refine(solution, keyframes, {}, CONFIG)
+    again = refine(solution, keyframes, {}, CONFIG).solution
     assert all((refined.poses[key] == again.poses[key]).all() for key in refined.poses)
 
 
@@ -101,7 +103,7 @@ def test_matches_of_a_loop_that_were_wrong_do_little_harm(
     turned = np.column_stack([shared[:, 0], np.roll(shared[:, 1], 7)])
     wrong = replace(first, constraint=replace(first.constraint, shared=turned))
     spoilt = replace(solution, verdicts=(wrong, *solution.verdicts[1:]))
-    assert error(refine(spoilt, keyframes, {}, CONFIG), truth) < 0.6 * error(solution, truth)
+    assert error(refine(spoilt, keyframes, {}, CONFIG).solution, truth) < 0.6 * error(solution, truth)
 
 
 def test_poses_stay_where_nothing_was_accepted_or_nothing_is_wanted(
@@ -109,12 +111,12 @@ def test_poses_stay_where_nothing_was_accepted_or_nothing_is_wanted(
 ) -> None:
     _, keyframes, solution = two_laps
     refused = replace(solution, verdicts=tuple(replace(v, accepted=False) for v in solution.verdicts))
-    assert refine(refused, keyframes, {}, CONFIG) is refused
+    assert refine(refused, keyframes, {}, CONFIG).solution is refused
     seen = Observations(np.arange(3), np.zeros((3, 2), np.float32), np.ones(3, np.float32))
-    assert refine(refused, keyframes, {0: seen, 1: seen, 2: seen}, CONFIG) is refused
+    assert refine(refused, keyframes, {0: seen, 1: seen, 2: seen}, CONFIG).solution is refused
     for change in ({"closures": False}, {"rounds": 0}):
         config = CONFIG.with_changes(backend={"bundle": change})
-        assert refine(solution, keyframes, {}, config) is solution
+        assert refine(solution, keyframes, {}, config).solution is solution
 
 
 def test_loops_of_a_verifier_that_names_no_features_leave_those_of_the_neighbours(
@@ -122,7 +124,9 @@ def test_loops_of_a_verifier_that_names_no_features_leave_those_of_the_neighbour
 ) -> None:
     truth, keyframes, solution = two_laps
     bare = tuple(replace(v, constraint=replace(v.constraint, shared=None)) for v in solution.verdicts)
-    assert error(refine(replace(solution, verdicts=bare), keyframes, {}, CONFIG), truth) < error(solution, truth)
+    assert error(refine(replace(solution, verdicts=bare), keyframes, {}, CONFIG).solution, truth) < error(
+        solution, truth
+    )
 
 
 def test_neighbours_share_what_both_see() -> None:
@@ -152,4 +156,30 @@ def test_keyframes_of_two_cameras_are_adjusted_together(
         return replace(keyframe, intrinsics=other, features=replace(keyframe.features, pixels=pixels))
 
     mixed = [through_other(k) if k.id >= PER_LAP else k for k in keyframes]
-    assert error(refine(solution, mixed, {}, CONFIG), truth) < 0.5 * error(solution, truth)
+    assert error(refine(solution, mixed, {}, CONFIG).solution, truth) < 0.5 * error(solution, truth)
+
+
+def test_an_adjustment_that_predicts_observations_held_out_worse_is_undone(
+    two_laps: tuple[FloatArray, list[Keyframe], GraphSolution], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _, keyframes, solution = two_laps
+    kept = refine(solution, keyframes, {}, CONFIG)
+    assert kept.held_out is not None
+    assert kept.held_out.observations >= 50
+    assert kept.held_out.after < kept.held_out.before
+
+    rng = np.random.default_rng(4)
+    spoilt = {key: noisy(T, rng, 1.0, np.full(6, 0.05)) if key else T for key, T in solution.poses.items()}
+    monkeypatch.setattr(bundle, "_adjusted", lambda held, factors, mask, values, iterations: with_poses(spoilt, values))
+    undone = refine(solution, keyframes, {}, CONFIG)
+    assert undone.held_out is not None
+    assert undone.held_out.is_worse
+    assert undone.solution is solution
+
+
+def with_poses(poses: dict[int, FloatArray], values: gtsam.Values) -> gtsam.Values:
+    """The same values with other poses: an adjustment that went wrong."""
+    wrong = gtsam.Values(values)
+    for key, T in poses.items():
+        wrong.update(key, gtsam.Pose3(T))
+    return wrong
