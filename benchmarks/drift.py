@@ -14,7 +14,8 @@ became of a pair of frames that was verified with the same matched nodes and the
 
 The table, in Markdown, gives the median and the range over the starts of the ATE (SE(3), all frames) in centimetres,
 each detector's change against no loops on the same recording, and which part it removes of what lies above the best
-front end of the sequence. The list, for many detectors, has a line for each of them.
+front end of the sequence. The list, for many detectors, has a line for each of them, with the live trajectory, that of
+the pose graph, and how the final one changes the live one at the worst start.
 """
 
 import argparse
@@ -45,7 +46,7 @@ from semslam.types import Frame, Keyframe, LoopCandidate, LoopConstraint, LoopRe
 ROWS = "rows.csv"
 ALONE = "none"
 KEY = ("sequence", "odometry", "start", "detector")
-VALUES = ("alone_m", "ate_m", "tracked", "accepted", "true", "inaccurate", "false")
+VALUES = ("alone_m", "live_m", "graph_m", "ate_m", "tracked", "accepted", "true", "inaccurate", "false")
 Row = dict[str, str]
 NameT = TypeVar("NameT", bound=Hashable)
 
@@ -172,6 +173,8 @@ def row_of(metrics: Metrics, name: str, start: int) -> Row:
         "start": start,
         "detector": metrics.detector,
         "alone_m": metrics.odometry_only.ate_rmse_m,
+        "live_m": metrics.live.ate_rmse_m,
+        "graph_m": metrics.pose_graph.ate_rmse_m,
         "ate_m": metrics.optimized.ate_rmse_m,
         "tracked": round(metrics.tracked / metrics.frames, 4),
         "accepted": metrics.loops.accepted,
@@ -221,11 +224,24 @@ def print_table(arguments: argparse.Namespace) -> None:
 
 def print_list(arguments: argparse.Namespace) -> None:
     rows = read_rows(arguments.folder / ROWS)
-    print("| sequence | odometry | detector | ATE, cm | true/inaccurate/false |\n|---|---|---|---|---|")
+    head = (
+        "sequence",
+        "odometry",
+        "detector",
+        "live, cm",
+        "pose graph, cm",
+        "ATE, cm",
+        "to live, worst",
+        "true/inaccurate/false",
+    )
+    print(f"| {' | '.join(head)} |\n|{'---|' * len(head)}")
     for sequence, odometry, detector in unique((row["sequence"], row["odometry"], row["detector"]) for row in rows):
         inside = [row for row in rows if row["sequence"] == sequence]
         kinds = [sum(errors(inside, odometry, detector, kind).values()) for kind in ("true", "inaccurate", "false")]
-        cells = [spread(errors(inside, odometry, detector).values()), "/".join(f"{kind:.0f}" for kind in kinds)]
+        live, graph, final = (errors(inside, odometry, detector, of) for of in ("live_m", "graph_m", "ate_m"))
+        cells = [spread(each.values()) for each in (live, graph, final)]
+        changes = [final[start] / live[start] - 1 for start in final if start in live]
+        cells += [f"{100 * max(changes):+.0f} %" if changes else "-", "/".join(f"{kind:.0f}" for kind in kinds)]
         print(f"| {' | '.join([sequence, odometry, detector, *cells])} |")
 
 
