@@ -1,5 +1,9 @@
 """The pose graph: keyframes, odometry, loops; one robust optimisation, a verdict for each loop."""
 
+from collections.abc import Iterable
+from copy import copy
+from typing import Self
+
 import numpy.typing as npt
 
 from semslam.backend.graph.checks import checked_covariance, checked_pose
@@ -112,6 +116,18 @@ class PoseGraph:
         """
         if self._loops.pop((match, query), None) is None:
             raise GraphError(f"There is no loop from {match} to {query}.")
+
+    def with_loops(self, loops: Iterable[LoopConstraint]) -> Self:
+        """The same graph with other loops in place of its own.
+
+        Raises:
+            GraphError: as ``add_loop``.
+        """
+        changed = copy(self)
+        changed._loops = {}
+        for loop in loops:
+            changed.add_loop(loop)
+        return changed
 
     def optimize(self) -> GraphSolution:
         """Optimise by the configured strategy, from odometry's start and, where that ends lower, from a chordal one.

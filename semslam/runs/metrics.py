@@ -134,6 +134,7 @@ class Metrics(_Record):
         error: what stopped it, where that was an error.
         realtime: of a run in real time; None of all others, which give the same result each time.
         sensor: what was estimated of a camera that states no read-out; None of all others.
+        loop_delay: of depth after the instants that the camera states, where loops were corrected for one.
         held_out: how the last adjustment was judged; None where there was none, or too little to judge it by.
     """
 
@@ -158,4 +159,5 @@ class Metrics(_Record):
     error: str | None = None
     realtime: RealTimeMetrics | None = None
     sensor: SensorMetrics | None = None
+    loop_delay: TimingMetrics | None = None
     held_out: HeldOutMetrics | None = None

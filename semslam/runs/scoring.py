@@ -14,7 +14,15 @@ from semslam.eval.metrics import TrajectoryMetrics
 from semslam.eval.trajectory import coverage, score_trajectory
 from semslam.runs.contributions import loop_contributions
 from semslam.runs.ledger import rejected_entry, verified_entry
-from semslam.runs.metrics import HeldOutMetrics, LoopMetrics, Metrics, RealTimeMetrics, SensorMetrics, TimeMetrics
+from semslam.runs.metrics import (
+    HeldOutMetrics,
+    LoopMetrics,
+    Metrics,
+    RealTimeMetrics,
+    SensorMetrics,
+    TimeMetrics,
+    TimingMetrics,
+)
 from semslam.system.result import FrameState, SlamResult
 from semslam.types import (
     JudgedLoop,
@@ -84,9 +92,17 @@ def score_run(
         error=error,
         realtime=realtime,
         sensor=sensor,
+        loop_delay=_loop_delay(slam),
         held_out=_held_out(slam),
     )
     return Scores(odometry, live, trajectory, ledger, metrics)
+
+
+def _loop_delay(slam: SlamResult) -> TimingMetrics | None:
+    found = slam.loop_delay
+    if found is None:
+        return None
+    return TimingMetrics(ms=1000 * found.seconds, sigma_ms=1000 * found.sigma, determined=True)
 
 
 def _held_out(slam: SlamResult) -> HeldOutMetrics | None:

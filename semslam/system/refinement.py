@@ -11,9 +11,11 @@ from semslam.backend.bundle.held_out import HeldOut
 from semslam.backend.bundle.tracks import MatchedFeatures, join_tracks
 from semslam.backend.pose_graph import GraphSolution
 from semslam.config import Config
+from semslam.errors import GraphError
 from semslam.loop.verification.neighbours import shared_features
 from semslam.types import Intrinsics, Keyframe, Observations
 
+STAY = "The poses are those of the pose graph."
 SEEN_TWICE = {"min_views": 2}
 """Features that closures share are no part of odometry, so that two views of one already add information."""
 
@@ -25,10 +27,12 @@ class Refinement:
     Attributes:
         solution: the one to go on with.
         held_out: what observations that took no part say of the adjustment; None where there was none, or are too few.
+        notes: what was not done, a sentence each.
     """
 
     solution: GraphSolution
     held_out: HeldOut | None = None
+    notes: tuple[str, ...] = ()
 
 
 def refine(
@@ -45,9 +49,6 @@ def refine(
         keyframes: ``keyframes[i].id`` is i.
         observations: landmarks that the odometry saw, by keyframe; may be empty.
         config: its sections ``backend`` and ``verification``, and the seed.
-
-    Raises:
-        GraphError: the optimiser failed.
     """
     settings = config.backend.bundle
     if not (settings.rounds and solution.loops):
@@ -60,10 +61,17 @@ def refine(
     edges = (*solution.odometry, *solution.loops, *solution.covisible)
     camera = keyframes[0].intrinsics
     observations = {key: _as_seen_by(camera, keyframes[key].intrinsics, seen) for key, seen in observations.items()}
-    result = adjust(solution.poses, observations, camera, settings, edges)
+    try:
+        result = adjust(solution.poses, observations, camera, settings, edges)
+    except GraphError as error:
+        return Refinement(solution, notes=(f"{error} {STAY}",))
     held_out = result.held_out
     if held_out is not None and held_out.is_worse:
-        return Refinement(solution, held_out)
+        note = (
+            f"The last adjustment was undone: the error of {held_out.observations} observations held out rose from "
+            f"{held_out.before:.3f} to {held_out.after:.3f} px. {STAY}"
+        )
+        return Refinement(solution, held_out, (note,))
     return Refinement(replace(solution, poses=result.poses), held_out)
 
 

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from semslam.backend.bundle.held_out import HeldOut
+from semslam.backend.loop_delay import LoopDelay
 from semslam.backend.pose_graph import GraphSolution
 from semslam.types import (
     FloatArray,
@@ -61,6 +62,7 @@ class SlamResult:
         poses: (N, 4, 4) optimised T_world_cam of every frame.
         components: for each frame the map it ends in, 0 the largest; maps that a loop joined share a number.
         live_loops: match and query of the loops that the live graph follows at the end.
+        loop_delay: of depth after colour, where loops showed one and were corrected.
         held_out: what observations that took no part in the adjustment say of it, where there are enough.
         notes: what could not be done, a sentence each.
     """
@@ -73,6 +75,7 @@ class SlamResult:
     poses: Transforms
     components: tuple[int, ...]
     live_loops: frozenset[tuple[int, int]] = frozenset()
+    loop_delay: LoopDelay | None = None
     held_out: HeldOut | None = None
     notes: tuple[str, ...] = ()
 

@@ -8,9 +8,9 @@ import numpy as np
 
 from semslam.backend.bundle.covisibility import Covisibility
 from semslam.backend.graph.products import Edge, GraphSolution
+from semslam.backend.loop_delay import optimize_at_color
 from semslam.backend.pose_graph import PoseGraph
 from semslam.config import Config
-from semslam.errors import GraphError
 from semslam.frontend.keyframes import KeyframeBuilder
 from semslam.frontend.odometry import Odometry, Preparing
 from semslam.geometry.se3 import invert, orthonormalise
@@ -182,21 +182,12 @@ class Slam:
         if self._queue is not None:
             self._take_in(self._queue.rest())
         with self._stopwatch.stage("optimize"):
-            solution = self._graph.optimize()
-        graph_poses = self._recover(solution)
-        notes: list[str] = []
-        held_out = None
+            velocities = {each.id: each.velocity for each in self._keyframes if each.velocity is not None}
+            timed = optimize_at_color(self._graph, velocities)
+        graph_poses = self._recover(timed.solution)
         with self._stopwatch.stage("bundle"):
-            try:
-                refinement = refine(solution, self._keyframes, self._observations, self._config)
-                solution, held_out = refinement.solution, refinement.held_out
-            except GraphError as error:
-                notes.append(f"{error} The poses are those of the pose graph.")
-        if held_out is not None and held_out.is_worse:
-            notes.append(
-                f"The last adjustment was undone: the error of {held_out.observations} observations held out rose "
-                f"from {held_out.before:.3f} to {held_out.after:.3f} px. The poses are those of the pose graph."
-            )
+            refinement = refine(timed.solution, self._keyframes, self._observations, self._config)
+        solution = refinement.solution
         component_of = solution.component_of
         components = {keyframe.map_id: component_of[keyframe.id] for keyframe in self._keyframes}
         unplaced = len(solution.components)
@@ -209,8 +200,9 @@ class Slam:
             poses=self._recover(solution),
             components=tuple(components.get(state.map_id, unplaced) for state in self._frames),
             live_loops=frozenset(self._live_loops),
-            held_out=held_out,
-            notes=tuple(notes),
+            loop_delay=timed.delay,
+            held_out=refinement.held_out,
+            notes=(*([] if timed.delay is None else [timed.delay.sentence]), *refinement.notes),
         )
 
     def leave_pending(self) -> None:
