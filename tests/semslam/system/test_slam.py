@@ -6,8 +6,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from semslam.backend.bundle.bundle import BundleResult
 from semslam.backend.incremental import IncrementalPoseGraph
-from semslam.backend.pose_graph import GraphSolution, PoseGraph
+from semslam.backend.pose_graph import PoseGraph
 from semslam.config import Config, LoopConfig
 from semslam.errors import GraphError
 from semslam.frontend.keyframes import KeyframeBuilder
@@ -162,11 +163,11 @@ def test_finishing_before_a_frame_is_an_error_and_not_a_result() -> None:
 
 
 def test_an_adjustment_that_fails_leaves_the_pose_graphs_poses(monkeypatch: pytest.MonkeyPatch) -> None:
-    def fail(*_: object) -> GraphSolution:
+    def fail(*_: object) -> BundleResult:
         raise GraphError("The bundle could not be adjusted: the system is indeterminate.")
 
     _, kept = run_ring()
-    monkeypatch.setattr("semslam.system.slam.refine", fail)
+    monkeypatch.setattr("semslam.system.refinement.adjust", fail)
     _, result = run_ring()
     np.testing.assert_allclose(result.poses, kept.poses, atol=1e-9)
     assert len(result.notes) == 1
