@@ -8,12 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from semslam.backend.pose_graph import GraphSolution
 from semslam.config import Config
-from semslam.errors import DatasetError, GraphError, ResultsError
+from semslam.errors import DatasetError, ResultsError
 from semslam.runs.manifest import seal
 from semslam.runs.pipeline import run
 from semslam.runs.place import reserved_anew
 from semslam.runs.results import read_ledger, read_run, write_ledger, write_run
+from semslam.system.refinement import Refinement
 from semslam.types import LedgerEntry, LoopEvidence, LoopOutcome, NodePair
 from tests.conftest import WallDataset
 
@@ -40,8 +42,8 @@ def test_unreadable_frames_are_counted_and_named(wall: WallDataset) -> None:
 
 
 def test_an_adjustment_that_failed_is_told(wall: WallDataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def fail(*_: object) -> None:
-        raise GraphError("The bundle could not be adjusted: the system is indeterminate.")
+    def fail(solution: GraphSolution, *_: object) -> Refinement:
+        return Refinement(solution, notes=("The bundle could not be adjusted: the system is indeterminate.",))
 
     monkeypatch.setattr("semslam.system.slam.refine", fail)
     write_run(run(wall, ALONE), wall, tmp_path / "run", plots=False)
