@@ -75,7 +75,7 @@ class TimedSolution:
 
 
 def optimize_at_color(graph: PoseGraph, velocities: Mapping[int, FloatArray]) -> TimedSolution:
-    """Optimise a graph, and again with loops corrected for a delay, where they determine one.
+    """Optimise a graph, and again with loops corrected for a delay, where they determine one and none is lost by it.
 
     Args:
         graph: keyframes, odometry and loops; it stays as it is.
@@ -90,12 +90,15 @@ def optimize_at_color(graph: PoseGraph, velocities: Mapping[int, FloatArray]) ->
         if found is None or (delay is not None and abs(found.seconds) < SETTLED):
             break
         # The graph gives way to a share of each correction: what is left of the last one says how large that is.
-        step = found.seconds * min(max(1.0 / (1.0 - found.seconds / last), 1.0), FASTER) if last else found.seconds
+        left = found.seconds / last if last else 0.0
+        step = found.seconds * (min(1.0 / (1.0 - left), FASTER) if 0.0 < left < 1.0 else 1.0)
         total = replace(found, seconds=step if delay is None else delay.seconds + step)
         if not total.is_certain:
             break
-        delay, last = total, step
-        solution = graph.with_loops(at_color(loop, delay.seconds, velocities) for loop in graph.loops).optimize()
+        corrected = graph.with_loops(at_color(loop, total.seconds, velocities) for loop in graph.loops).optimize()
+        if len(corrected.loops) < len(solution.loops):
+            break
+        solution, delay, last = corrected, total, step
     return TimedSolution(solution, delay)
 
 
@@ -106,7 +109,7 @@ def loop_delay(solution: GraphSolution, velocities: Mapping[int, FloatArray]) ->
         loop = verdict.constraint
         if verdict.accepted and loop.method == BY_DEPTH and {loop.match, loop.query} <= velocities.keys():
             T_query_match = invert(solution.poses[loop.query]) @ solution.poses[loop.match]
-            whiten = np.linalg.cholesky(np.linalg.inv(loop.covariance)).T
+            whiten = np.linalg.inv(np.linalg.cholesky(loop.covariance))
             turned.append(whiten @ (velocities[loop.query] - adjoint(T_query_match) @ velocities[loop.match]))
             off.append(whiten @ tangent(T_query_match @ loop.T_match_query))
     if len(off) < FEWEST:
