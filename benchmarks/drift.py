@@ -9,13 +9,11 @@ DIR and replayed with each detector. Every replay adds a line to DIR/rows.csv, a
 a run that was stopped goes on where it was. After a change of verification or back end delete rows.csv, after one of an
 odometry its recordings. With ``--runs`` each replay also leaves a run folder.
 
-A process takes one start of a sequence, on one thread. Odometries and detectors share its segmentations, and what
-became of a pair of frames that was verified with the same matched nodes and the same predicted pose.
+A process takes one start, on one thread; odometries and detectors share its segmentations and verified pairs of frames.
 
-The table, in Markdown, gives the median and the range over the starts of the ATE (SE(3), all frames) in centimetres,
-each detector's change against no loops on the same recording, and which part it removes of what lies above the best
-front end of the sequence. The list, for many detectors, has a line for each of them, with the live trajectory, that of
-the pose graph, and how the final one changes the live one at the worst start.
+The table gives the median and the range over the starts of the ATE (SE(3), all frames) in centimetres, each detector's
+change against no loops, and which part it removes of what lies above the best front end of the sequence. The list has
+a line for each detector: live, pose graph and final trajectory, and the change from live to final at the worst start.
 """
 
 import argparse
@@ -147,9 +145,8 @@ def record(dataset: Dataset, config: Config, directory: Path) -> None:
     """Track a sequence, unless that was done before."""
     if directory.exists():
         return
-    spent = time.process_time()
+    spent, unfinished = time.process_time(), directory.with_suffix(".partial")
     recording = run(dataset, config).recording
-    unfinished = directory.with_suffix(".partial")
     unfinished.mkdir(exist_ok=True)
     write_recording(unfinished, recording)
     unfinished.rename(directory)
@@ -224,25 +221,15 @@ def print_table(arguments: argparse.Namespace) -> None:
 
 def print_list(arguments: argparse.Namespace) -> None:
     rows = read_rows(arguments.folder / ROWS)
-    head = (
-        "sequence",
-        "odometry",
-        "detector",
-        "live, cm",
-        "pose graph, cm",
-        "ATE, cm",
-        "to live, worst",
-        "true/inaccurate/false",
-    )
-    print(f"| {' | '.join(head)} |\n|{'---|' * len(head)}")
+    head = "sequence | odometry | detector | live, cm | pose graph, cm | ATE, cm | to live, worst | true/inacc./false"
+    print(f"| {head} |\n|{'---|' * 8}")
     for sequence, odometry, detector in unique((row["sequence"], row["odometry"], row["detector"]) for row in rows):
         inside = [row for row in rows if row["sequence"] == sequence]
         kinds = [sum(errors(inside, odometry, detector, kind).values()) for kind in ("true", "inaccurate", "false")]
         live, graph, final = (errors(inside, odometry, detector, of) for of in ("live_m", "graph_m", "ate_m"))
-        cells = [spread(each.values()) for each in (live, graph, final)]
-        changes = [final[start] / live[start] - 1 for start in final if start in live]
-        cells += [f"{100 * max(changes):+.0f} %" if changes else "-", "/".join(f"{kind:.0f}" for kind in kinds)]
-        print(f"| {' | '.join([sequence, odometry, detector, *cells])} |")
+        worst = max((final[start] / live[start] - 1 for start in final if start in live), default=float("nan"))
+        cells = [sequence, odometry, detector, *(spread(each.values()) for each in (live, graph, final))]
+        print(f"| {' | '.join(cells)} | {100 * worst:+.0f} % | {'/'.join(f'{kind:.0f}' for kind in kinds)} |")
 
 
 def line(rows: Sequence[Row], sequence: str, odometry: str, detectors: Sequence[str], best: float) -> str:
@@ -302,14 +289,11 @@ def main() -> None:
     measuring.add_argument("--max-frames", type=int)
     measuring.add_argument("--jobs", type=int, default=1, help="processes, of one thread each")
     measuring.add_argument("--runs", action="store_true", help="leave a run folder of each replay")
-    printing = commands.add_parser("table")
-    printing.set_defaults(work=print_table)
-    printing.add_argument("folder", type=Path)
-    listing = commands.add_parser("list")
-    listing.set_defaults(work=print_list)
-    listing.add_argument("folder", type=Path)
-    arguments = parser.parse_args()
-    arguments.work(arguments)
+    for name, work in (("table", print_table), ("list", print_list)):
+        printing = commands.add_parser(name)
+        printing.set_defaults(work=work)
+        printing.add_argument("folder", type=Path)
+    (arguments := parser.parse_args()).work(arguments)
 
 
 if __name__ == "__main__":
