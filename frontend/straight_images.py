@@ -1,7 +1,6 @@
 """Images of one instant: what a global shutter would have seen, with depth measured while colour was exposed."""
 
 from dataclasses import dataclass, replace
-from functools import lru_cache
 
 import cv2
 import numpy as np
@@ -65,7 +64,8 @@ class _Moving:
 
     def __init__(self, camera: Intrinsics, velocity: Float32Array) -> None:
         self._camera = camera
-        self._x, self._y = _rays(camera)
+        rays = camera.rays()
+        self._x, self._y = rays[:1, :, 0], rays[:, :1, 1]
         turning, shifting = velocity[:3], velocity[3:]
         self._by_turning = (
             turning[1] - turning[2] * self._y,
@@ -89,11 +89,3 @@ class _Moving:
         u = np.float32(camera.fx) * x / z + np.float32(camera.cx)
         v = np.float32(camera.fy) * y / z + np.float32(camera.cy)
         return _Seen(u, v, z)
-
-
-@lru_cache(maxsize=4)
-def _rays(camera: Intrinsics) -> tuple[Float32Array, Float32Array]:
-    """Viewing direction of each pixel, with z = 1: x (1, W) and y (H, 1)."""
-    x = ((np.arange(camera.width) - camera.cx) / camera.fx).astype(np.float32)
-    y = ((np.arange(camera.height) - camera.cy) / camera.fy).astype(np.float32)
-    return x[None], y[:, None]

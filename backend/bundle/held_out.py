@@ -1,12 +1,12 @@
 """Observations that take no part in an adjustment, and say whether it is one."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
-from semslam.backend.bundle.observations import ObservationTable
+from semslam.backend.bundle.observations import ObservationTable, reprojection_errors
 from semslam.geometry.se3 import invert
 from semslam.types import FloatArray, IntArray, Intrinsics, Points3, Transform
 
@@ -113,32 +113,22 @@ class _Views:
         keys, rows = np.unique(observed.keys[chosen], return_inverse=True)
         T_cam_world = np.stack([invert(poses[int(key)]) for key in keys])[rows]
         self._R, self._t = T_cam_world[:, :3, :3], T_cam_world[:, :3, 3]
-        self._pixels, self._depths = observed.pixels[chosen], observed.depths[chosen]
-        self._sigmas = observed.sigmas[chosen]
-        self._camera, self._focal_baseline = camera, camera.fx * baseline
-        self._roots = np.sqrt(weights)
+        self._seen = observed.take(chosen)
+        self._camera, self._baseline = camera, baseline
+        self._scale = np.sqrt(weights) / self._seen.sigmas[:, None]
 
     def errors(self, points: Points3) -> tuple[FloatArray, FloatArray]:
         """Whitened errors (N, 3) of u, v and disparity of each one's point (N, 3), and derivatives (N, 3, 3) by it."""
         camera = self._camera
-        x, y, z = (np.einsum("nij,nj->ni", self._R, points) + self._t).T
-        z = np.maximum(z, NEAREST)
-        inverse = 1.0 / z
-        has_depth = self._depths > 0
-        measured = 1.0 / np.where(has_depth, self._depths, z)
-        errors = np.column_stack(
-            [
-                camera.fx * x * inverse + camera.cx - self._pixels[:, 0],
-                camera.fy * y * inverse + camera.cy - self._pixels[:, 1],
-                self._focal_baseline * (inverse - measured),
-            ]
-        )
+        local = np.einsum("nij,nj->ni", self._R, points) + self._t
+        local[:, 2] = np.maximum(local[:, 2], NEAREST)
+        errors, z = reprojection_errors(replace(self._seen, local=local), camera, self._baseline)
+        x, y = local[:, 0], local[:, 1]
         by_point = np.zeros((len(z), 3, 3))
-        by_point[:, 0, 0], by_point[:, 0, 2] = camera.fx * inverse, -camera.fx * x * inverse**2
-        by_point[:, 1, 1], by_point[:, 1, 2] = camera.fy * inverse, -camera.fy * y * inverse**2
-        by_point[:, 2, 2] = np.where(has_depth, -self._focal_baseline * inverse**2, 0.0)
-        scale = self._roots / self._sigmas[:, None]
-        return errors * scale, (by_point @ self._R) * scale[:, :, None]
+        by_point[:, 0, 0], by_point[:, 0, 2] = camera.fx / z, -camera.fx * x / z**2
+        by_point[:, 1, 1], by_point[:, 1, 2] = camera.fy / z, -camera.fy * y / z**2
+        by_point[:, 2, 2] = np.where(self._seen.depths > 0, -camera.fx * self._baseline / z**2, 0.0)
+        return errors * self._scale, (by_point @ self._R) * self._scale[:, :, None]
 
 
 def _placed(views: _Views, rows: IntArray, points: Points3) -> Points3:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import gtsam
 import numpy as np
+import numpy.typing as npt
 from scipy.sparse import coo_array
 
 from semslam.geometry.se3 import invert, transform_points
@@ -41,6 +42,18 @@ class ObservationTable:
         """(M,) column at which the right camera of a virtual stereo pair would see it; meaningless without depth."""
         depths = np.where(self.depths > 0, self.depths, 1.0)
         return self.pixels[:, 0] - intrinsics.fx * baseline / depths
+
+    def take(self, rows: npt.NDArray[np.bool_]) -> "ObservationTable":
+        """Some of the observations (M,), of the same landmarks."""
+        return replace(
+            self,
+            keys=self.keys[rows],
+            landmarks=self.landmarks[rows],
+            pixels=self.pixels[rows],
+            depths=self.depths[rows],
+            sigmas=self.sigmas[rows],
+            local=self.local[rows],
+        )
 
     def moved(self, poses: Mapping[int, Transform], values: gtsam.Values) -> "ObservationTable":
         """The same observations of landmarks and keyframes that have moved."""
@@ -123,16 +136,8 @@ def thinned(observed: ObservationTable, wanted: int) -> ObservationTable:
             kept[landmark] = True
             for key in keys:
                 missing[key] -= 1
-    stays = kept[observed.landmarks]
-    return ObservationTable(
-        keys=observed.keys[stays],
-        landmarks=(np.cumsum(kept) - 1)[observed.landmarks[stays]],
-        pixels=observed.pixels[stays],
-        depths=observed.depths[stays],
-        sigmas=observed.sigmas[stays],
-        points=observed.points[kept],
-        local=observed.local[stays],
-    )
+    left = observed.take(kept[observed.landmarks])
+    return replace(left, landmarks=(np.cumsum(kept) - 1)[left.landmarks], points=observed.points[kept])
 
 
 def reprojection_errors(
