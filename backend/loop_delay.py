@@ -15,8 +15,10 @@ from semslam.backend.pose_graph import PoseGraph
 from semslam.geometry.se3 import adjoint, exp_so3, invert, make_transform, tangent
 from semslam.types import FloatArray, LoopConstraint, Transform
 
-ROUNDS = 3
+ROUNDS = 6
 """Optimisations with corrected loops at most: the graph gives way to a delay that is still in it."""
+KEPT = 0.9
+"""Share of the accepted loops that a correction must keep: near the threshold some change sides by chance."""
 FASTER = 4.0
 """Factor on a further correction at the most."""
 SETTLED = 5e-4
@@ -75,7 +77,7 @@ class TimedSolution:
 
 
 def optimize_at_color(graph: PoseGraph, velocities: Mapping[int, FloatArray]) -> TimedSolution:
-    """Optimise a graph, and again with loops corrected for a delay, where they determine one and none is lost by it.
+    """Optimise a graph, and again with loops corrected for a delay, where they determine one and the loops fit it.
 
     Args:
         graph: keyframes, odometry and loops; it stays as it is.
@@ -84,21 +86,23 @@ def optimize_at_color(graph: PoseGraph, velocities: Mapping[int, FloatArray]) ->
     Raises:
         GraphError: the graph is empty or the optimiser failed.
     """
-    solution, delay, last = graph.optimize(), None, 0.0
+    solution, delay, last, same = graph.optimize(), None, 0.0, False
+    needed = KEPT * len(solution.loops)
     for _ in range(ROUNDS):
         found = loop_delay(solution, velocities)
         if found is None or (delay is not None and abs(found.seconds) < SETTLED):
             break
-        # The graph gives way to a share of each correction: what is left of the last one says how large that is.
-        left = found.seconds / last if last else 0.0
+        # The graph gives way to a share of each correction: what is left of the last one says how large that is, as
+        # long as the same loops say it.
+        left = found.seconds / last if same else 0.0
         step = found.seconds * (min(1.0 / (1.0 - left), FASTER) if 0.0 < left < 1.0 else 1.0)
         total = replace(found, seconds=step if delay is None else delay.seconds + step)
         if not total.is_certain:
             break
         corrected = graph.with_loops(at_color(loop, total.seconds, velocities) for loop in graph.loops).optimize()
-        if len(corrected.loops) < len(solution.loops):
+        if len(corrected.loops) < needed:
             break
-        solution, delay, last = corrected, total, step
+        solution, delay, last, same = corrected, total, step, corrected.loops == solution.loops
     return TimedSolution(solution, delay)
 
 
@@ -121,8 +125,9 @@ def loop_delay(solution: GraphSolution, velocities: Mapping[int, FloatArray]) ->
         rest = np.abs(b - delay * a)
         weights = np.minimum(1.0, HUBER_K * 1.48 * np.median(rest) / np.maximum(rest, 1e-12))
     information = max(float((weights * a * a).sum()), 1e-12)
-    variance = float((weights * (b - delay * a) ** 2).mean()) / information
-    return LoopDelay(delay, float(np.sqrt(variance)), len(off))
+    # The graph has taken a part of the loops' errors, so their spread is that of all its residuals over its redundancy.
+    scale = 2.0 * solution.cost / (6 * len(solution.loops)) * solution.loop_scale**2
+    return LoopDelay(delay, float(np.sqrt(scale / information)), len(off))
 
 
 def at_color(loop: LoopConstraint, seconds: float, velocities: Mapping[int, FloatArray]) -> LoopConstraint:
