@@ -36,8 +36,9 @@ FREIBURG1 = ("360", "desk", "desk2", "floor", "plant", "room", "rpy", "teddy", "
 
 
 def cell(found: Estimate) -> str:
-    """Milliseconds with their standard deviation, or a dash."""
-    return f"{1000 * found.value:.1f} ± {1000 * found.sigma:.1f}" if found.is_determined else "-"
+    """Milliseconds with their standard deviation, in brackets where they are known roughly, or a dash."""
+    value = f"{1000 * found.value:.1f} ± {1000 * found.sigma:.1f}"
+    return value if found.is_determined else f"({value})" if found.is_rough else "-"
 
 
 def live_ate(name: str, frames: Iterable[Frame], truth: Trajectory, camera: Intrinsics) -> str:

@@ -8,6 +8,9 @@ SURE, LONGEST = 1.5e-3, 0.06
 """Seconds of standard deviation up to which a time counts as determined, and the longest read-out or delay."""
 FASTEST = 0.004
 """Seconds; a shorter read-out is a global shutter's: no rolling one is as fast."""
+ROUGH, CLEAR = 2.0, 4.0
+"""Multiple of the limit up to which a value is roughly known, and the standard deviations by which it must then differ
+from what is assumed without it."""
 SURE_FACTOR, LARGEST_FACTOR = 0.01, 10.0
 """The same of the depth factor."""
 
@@ -32,6 +35,15 @@ class Estimate:
     def is_determined(self) -> bool:
         """Whether the recording determines it."""
         return self.sigma <= self.limit and abs(self.value) <= self.range
+
+    @property
+    def is_rough(self) -> bool:
+        """Whether the recording does not determine it, but says roughly what it is."""
+        return self.limit < self.sigma <= ROUGH * self.limit and abs(self.value) <= self.range
+
+    def is_better_than(self, assumed: float) -> bool:
+        """Whether to go by it and not by what is assumed: it is determined, or known roughly to be something else."""
+        return self.is_determined or (self.is_rough and abs(self.value - assumed) > CLEAR * self.sigma)
 
 
 def a_time(seconds: float, sigma: float) -> Estimate:
@@ -68,17 +80,17 @@ class SensorEstimate:
         return any(estimate.is_determined for estimate in found)
 
     def applied(self, setup: CameraSetup) -> CameraSetup:
-        """A camera with what is determined; what is not stays as it is."""
+        """A camera with what is determined, or known roughly and far from what it states; the rest stays as it is."""
         camera, units = setup.intrinsics, setup.depth_scale
         if units is not None and self.depth_factor.is_determined:
             units = round(units * self.depth_factor.value, 3)
-        timed = replace(
-            camera,
-            readout=_readout(self.readout) if self.readout.is_determined else camera.readout,
-            delay=round(self.delay.value, 6) if self.delay.is_determined else camera.delay,
-            depth_readout=_readout(self.depth_readout) if self.depth_readout.is_determined else camera.depth_readout,
-        )
-        return replace(setup, intrinsics=timed, depth_scale=units)
+        if self.readout.is_better_than(camera.readout or 0.0):
+            camera = replace(camera, readout=_readout(self.readout))
+        if self.delay.is_better_than(camera.delay):
+            camera = replace(camera, delay=round(self.delay.value, 6))
+        if self.depth_readout.is_better_than(camera.depth_readout_beside(camera.readout or 0.0)):
+            camera = replace(camera, depth_readout=_readout(self.depth_readout))
+        return replace(setup, intrinsics=camera, depth_scale=units)
 
 
 def _readout(found: Estimate) -> float:

@@ -105,9 +105,10 @@ def _table(name: str, estimate: "SensorEstimate") -> Table:
 
 def _cells(found: "Estimate", factor: float, digits: int) -> tuple[str, str, str]:
     """Value, standard deviation and verdict."""
-    if not found.is_determined:
+    if not found.is_determined and not found.is_rough:
         return "-", "-", "undetermined"
-    return f"{found.value * factor:.{digits}f}", f"{found.sigma * factor:.{digits}f}", "determined"
+    verdict = "determined" if found.is_determined else "roughly"
+    return f"{found.value * factor:.{digits}f}", f"{found.sigma * factor:.{digits}f}", verdict
 
 
 COMMANDS = (

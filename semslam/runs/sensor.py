@@ -95,7 +95,7 @@ def _timing(found: Estimate) -> TimingMetrics:
 
 def _sentence(estimate: SensorEstimate) -> str:
     found = estimate.readout
-    if not found.is_determined:
+    if not found.is_better_than(0.0):
         return (
             "The camera states no read-out, and the motion of the first seconds does not determine it: "
             "all rows are taken to be exposed at once (readout in camera.yaml, feature_map.readout)."

@@ -70,6 +70,18 @@ def test_what_is_determined_goes_into_the_camera_and_nothing_else() -> None:
     assert SensorEstimate().applied(setup) == setup
 
 
+def test_what_is_known_roughly_counts_where_it_is_far_from_what_is_assumed() -> None:
+    rough = a_time(0.02, 2e-3)
+    assert rough.is_rough
+    assert not rough.is_determined
+    camera = SensorEstimate(rough, rough, rough).applied(CameraSetup(CAMERA)).intrinsics
+    assert (camera.readout, camera.delay, camera.depth_readout) == (0.02, 0.02, None)  # depth's is that of colour
+    near = a_time(0.007, 2e-3)
+    assert SensorEstimate(near, near, near).applied(CameraSetup(CAMERA)) == CameraSetup(CAMERA)
+    alone = SensorEstimate(depth_readout=rough).applied(CameraSetup(CAMERA)).intrinsics
+    assert (alone.readout, alone.depth_readout) == (None, 0.02)
+
+
 @pytest.mark.parametrize(("seconds", "readout"), [(5e-4, 0.0), (-0.001, 0.0), (0.003, 0.0), (0.01, 0.01)])
 def test_a_read_out_near_none_is_a_global_shutter(seconds: float, readout: float) -> None:
     applied = SensorEstimate(readout=a_time(seconds, 4e-4)).applied(CameraSetup(CAMERA))
