@@ -61,7 +61,11 @@ class OdometryChain:
         # The way from the chain's start to the earlier of the two is shared and cancels.
         shared = self._covariance[np.minimum(rows_a, rows_b)]
         covariance = Ad @ (self._covariance[np.maximum(rows_a, rows_b)] - shared) @ np.swapaxes(Ad, 1, 2)
-        return invert(self._T[rows_a]) @ T_b, covariance, self._chain[rows_a] == self._chain[rows_b]
+        return invert(self._T[rows_a]) @ T_b, covariance, self.joins(a, b)
+
+    def joins(self, a: npt.ArrayLike, b: npt.ArrayLike) -> BoolArray:
+        """Whether odometry joins pairs of keyframes (L,), (L,)."""
+        return np.asarray(self._chain[self._rows(a)] == self._chain[self._rows(b)])
 
     def poses(self) -> Iterator[tuple[int, int, FloatArray]]:
         """Each key, the key its chain starts with, and its pose (4, 4) in that one."""

@@ -73,7 +73,7 @@ def screen_loops(
 ) -> Screening:
     """Hold back loops that odometry contradicts, and groups of loops that contradict one another.
 
-    Loops between maps that odometry does not join can be compared with one another alone.
+    Loops between maps that odometry does not join can be compared with one another alone: those between the same two.
 
     Args:
         chain: odometry, its covariance widened where it was too small.
@@ -87,13 +87,13 @@ def screen_loops(
     drift = _drift(chain, loops)
     contradicted = (drift.distances > slack * max_residual) & (drift.headings < LINEAR)
     reasons: list[RejectionReason | None] = [RejectionReason.INCONSISTENT if no else None for no in contradicted]
-    plausible = np.flatnonzero(drift.joined & ~contradicted)
-    chosen = [loops[i] for i in plausible.tolist()]
-    ambiguous = _ambiguous(chain, chosen, drift.of(plausible))
-    for index in plausible[ambiguous]:
-        reasons[index] = RejectionReason.AMBIGUOUS
-    for index in np.flatnonzero(unsupported(chain, loops, max_residual, support)):
+    alone = unsupported(chain, loops, max_residual, support)
+    for index in np.flatnonzero(alone):
         reasons[index] = RejectionReason.UNSUPPORTED
+    plausible = np.flatnonzero(~contradicted & ~alone)
+    chosen = [loops[i] for i in plausible.tolist()]
+    for index in plausible[_ambiguous(chain, chosen, drift.of(plausible))]:
+        reasons[index] = RejectionReason.AMBIGUOUS
     return Screening(drift.distances, tuple(reasons))
 
 
@@ -104,18 +104,16 @@ class _Drift:
     Attributes:
         distances: (L,) Mahalanobis distances, 0 where odometry does not join the ends.
         shifts: (L, 6) the same as rotation vectors and translations.
-        joined: (L,) whether odometry joins the ends.
         headings: (L,) standard deviation of odometry's heading between the ends, radians.
     """
 
     distances: FloatArray
     shifts: FloatArray
-    joined: BoolArray
     headings: FloatArray
 
     def of(self, rows: IntArray) -> "_Drift":
         """The same of some loops."""
-        return _Drift(self.distances[rows], self.shifts[rows], self.joined[rows], self.headings[rows])
+        return _Drift(self.distances[rows], self.shifts[rows], self.headings[rows])
 
 
 def _drift(chain: OdometryChain, loops: Sequence[Edge]) -> _Drift:
@@ -125,12 +123,12 @@ def _drift(chain: OdometryChain, loops: Sequence[Edge]) -> _Drift:
     distances = np.zeros(len(loops))
     distances[joined] = np.sqrt(squared_mahalanobis(shifts[joined], (own + covariance)[joined]))
     headings = np.sqrt(np.maximum(np.trace(covariance[:, :3, :3], axis1=1, axis2=2), 0.0))
-    return _Drift(distances, shifts, joined, headings)
+    return _Drift(distances, shifts, headings)
 
 
 def _ambiguous(chain: OdometryChain, loops: Sequence[Edge], drift: _Drift) -> BoolArray:
     """(L,) loops of groups that odometry leaves in doubt, or that another group contradicts and does not lose to."""
-    pairs = _pairs(loops)
+    pairs = _pairs(chain, loops)
     off = _openness(chain, loops, pairs.first, pairs.second)
     closing = pairs.along & (off <= DOUBT)
     joined = zip(pairs.first[closing].tolist(), pairs.second[closing].tolist(), strict=True)
@@ -161,13 +159,13 @@ def _ambiguous(chain: OdometryChain, loops: Sequence[Edge], drift: _Drift) -> Bo
 def _openness(chain: OdometryChain, loops: Sequence[Edge], first: IntArray, second: IntArray) -> FloatArray:
     """Mahalanobis distance (P,) that the cycle through each pair of loops is from closing.
 
-    0 where there is no cycle, and where what is left of it does not make two places of one.
+    0 where what is left of it does not make two places of one.
     """
     off = np.zeros(len(first))
     for begin in range(0, len(first), BLOCK):
         block = slice(begin, begin + BLOCK)
         cycle = cycles(chain, loops, first[block], second[block])
-        open_ = cycle.joined & _is_apart(cycle.errors)
+        open_ = _is_apart(cycle.errors)
         covariances = (cycle.loops + cycle.odometry)[open_]
         off[block][open_] = np.sqrt(squared_mahalanobis(cycle.errors[open_], covariances))
     return off
@@ -224,7 +222,7 @@ class _Pairs:
     along: BoolArray
 
 
-def _pairs(loops: Sequence[Edge]) -> _Pairs:
+def _pairs(chain: OdometryChain, loops: Sequence[Edge]) -> _Pairs:
     queries = np.array([loop.to_key for loop in loops], dtype=np.int64)
     matches = np.array([loop.from_key for loop in loops], dtype=np.int64)
     near = np.unique(np.concatenate([_close(queries, REACH), _close(matches, NEAR)]), axis=0)
@@ -232,7 +230,8 @@ def _pairs(loops: Sequence[Edge]) -> _Pairs:
     by_query, by_match = np.abs(queries[first] - queries[second]), np.abs(matches[first] - matches[second])
     meeting = (by_query <= NEAR) | (by_match <= NEAR)
     along = (by_query <= REACH) & (by_match <= REACH)
-    kept = meeting | along
+    of_one_map = [chain.joins(ends[first], ends[second]) for ends in (matches, queries)]
+    kept = (meeting | along) & of_one_map[0] & of_one_map[1]
     return _Pairs(first[kept], second[kept], meeting[kept], along[kept])
 
 

@@ -163,6 +163,34 @@ def test_one_false_loop_says_nothing_of_other_places():
     assert found.reasons == (*(None,) * 25, "ambiguous")
 
 
+@pytest.mark.parametrize(
+    ("true", "false", "expected"),
+    [
+        (15, 15, ("ambiguous", "ambiguous")),
+        (15, 4, (None, "ambiguous")),
+        (4, 15, ("ambiguous", None)),
+        (6, 1, (None, "ambiguous")),
+        (1, 1, ("ambiguous", "ambiguous")),
+        (15, 0, (None, None)),
+    ],
+)
+def test_maps_that_odometry_does_not_join_are_joined_by_loops_that_others_do_not_contradict(true, false, expected):
+    rng = np.random.default_rng(6)
+    chain = OdometryChain(range(65), [edge for edge in measure_odometry(TRUTH, rng) if edge.from_key != 39])
+    right, wrong = loops_of(rng)
+    found = screen_loops(chain, [*right[:true], *wrong[15 : 15 + false]], 4.7, 1.5).reasons
+    assert found == (expected[0],) * true + (expected[1],) * false
+    assert screen_loops(chain, right, 4.7, 1.5).distances.max() == 0
+
+
+def test_loops_into_another_map_say_nothing_of_those_within_one():
+    rng = np.random.default_rng(7)
+    chain = OdometryChain(range(65), [edge for edge in measure_odometry(TRUTH, rng) if edge.from_key not in (9, 39)])
+    right, wrong = loops_of(rng)
+    loops = [*right[:5], *wrong[15:20]]  # of the same views, but into two maps
+    assert screen_loops(chain, loops, 4.7, 1.5).reasons == (None,) * 10
+
+
 def test_no_loops_and_maps_apart_are_no_error():
     chain = OdometryChain(range(4), [])
     assert screen_loops(chain, [], 4.7, 1.5).reasons == ()
