@@ -17,6 +17,7 @@ from semslam.backend.graph.factors import (
 from semslam.backend.graph.products import GraphSolution
 from semslam.backend.robust.least_squares import optimise
 from semslam.config import BackendConfig
+from semslam.errors import GraphError
 from semslam.types import LoopConstraint, Transform
 
 HOLD_SIGMA = 10.0
@@ -59,7 +60,7 @@ def leave_one_out(solution: GraphSolution, config: BackendConfig) -> Iterator[Co
     linear = [factor.linearize(values) for factor in factors]
     for index, constraint in enumerate(accepted):
         left_out = offset + index
-        step = _linear_graph([*linear[:left_out], *linear[left_out + 1 :]]).optimize()
+        step = _solved(_linear_graph([*linear[:left_out], *linear[left_out + 1 :]]))
         without = values.retract(step)
         poses = read_poses(without, solution.poses)
         tension = whole - 2.0 * _graph([*factors[:left_out], *factors[left_out + 1 :]]).error(without)
@@ -89,6 +90,23 @@ def _linear_graph(factors: list[gtsam.GaussianFactor]) -> gtsam.GaussianFactorGr
     for factor in factors:
         graph.push_back(factor)
     return graph
+
+
+def _solved(graph: gtsam.GaussianFactorGraph) -> gtsam.VectorValues:
+    """The step of a linear graph; by QR where a part that nothing else holds leaves it too badly conditioned otherwise.
+
+    Raises:
+        GraphError: neither solves it.
+    """
+    try:
+        return graph.optimize()
+    except RuntimeError:  # GTSAM's own: an indeterminate system
+        try:
+            return graph.optimize(gtsam.EliminateQR)
+        except RuntimeError as error:
+            raise GraphError(
+                f"The graph cannot be solved without one of its loops: {' '.join(str(error).split())}"
+            ) from error
 
 
 def _shift(poses: dict[int, Transform], reference: dict[int, Transform]) -> float:

@@ -72,3 +72,15 @@ def test_a_map_that_only_its_loop_holds_is_still_solvable():
     (one,) = leave_one_out(solution, CONFIG)
     assert one.shift_m == pytest.approx(0.0, abs=0.05)
     assert constraint_of(loop).candidate.match == one.constraint.candidate.match
+
+
+@pytest.mark.parametrize("sigma", [1e-2, 1e-3, 1e-4])
+def test_maps_apart_are_solvable_however_well_odometry_is_known(sigma):
+    truth, rng, sigmas = ring(40), np.random.default_rng(0), np.full(6, sigma)
+    odometry = [edge for edge in measure_odometry(truth, rng, 1.0, sigmas) if edge.from_key != 29]
+    loops = measure(truth, [(0, 28)], rng, 1.0, sigmas)
+    solution = judge_graph(PosedGraph(dict(enumerate(truth)), (*odometry, *loops)), CONFIG)
+    assert len(solution.components) == 2
+    (found,) = leave_one_out(solution, CONFIG)
+    assert np.isfinite(found.shift_m)
+    assert found.shift_m < 20 * sigma
