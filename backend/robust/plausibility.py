@@ -15,7 +15,7 @@ from semslam.backend.graph.chain import BoolArray, OdometryChain, deviations, sq
 from semslam.backend.graph.components import connected
 from semslam.backend.graph.products import Edge
 from semslam.backend.robust.calibration import cycles
-from semslam.backend.robust.support import unsupported
+from semslam.backend.robust.support import agreements, unsupported
 from semslam.geometry.se3 import invert
 from semslam.types import FloatArray, IntArray, RejectionReason
 
@@ -92,7 +92,7 @@ def screen_loops(
         reasons[index] = RejectionReason.UNSUPPORTED
     plausible = np.flatnonzero(~contradicted & ~alone)
     chosen = [loops[i] for i in plausible.tolist()]
-    for index in plausible[_ambiguous(chain, chosen, drift.of(plausible))]:
+    for index in plausible[_ambiguous(chain, chosen, drift.of(plausible), max_residual)]:
         reasons[index] = RejectionReason.AMBIGUOUS
     return Screening(drift.distances, tuple(reasons))
 
@@ -126,13 +126,17 @@ def _drift(chain: OdometryChain, loops: Sequence[Edge]) -> _Drift:
     return _Drift(distances, shifts, headings)
 
 
-def _ambiguous(chain: OdometryChain, loops: Sequence[Edge], drift: _Drift) -> BoolArray:
-    """(L,) loops of groups that odometry leaves in doubt, or that another group contradicts and does not lose to."""
+def _ambiguous(chain: OdometryChain, loops: Sequence[Edge], drift: _Drift, max_residual: float) -> BoolArray:
+    """(L,) loops of groups that odometry leaves in doubt, or that another group contradicts and does not lose to.
+
+    A group is what follows one another on both passes; between two maps, all that place the one alike in the other.
+    """
     pairs = _pairs(chain, loops)
     off = _openness(chain, loops, pairs.first, pairs.second)
     closing = pairs.along & (off <= DOUBT)
-    joined = zip(pairs.first[closing].tolist(), pairs.second[closing].tolist(), strict=True)
-    members = [list(component) for component in connected(range(len(loops)), joined)]
+    alike = np.column_stack([pairs.first[closing], pairs.second[closing]])
+    joined = np.concatenate([alike, agreements(chain, loops, max_residual)])
+    members = [list(component) for component in connected(range(len(loops)), map(tuple, joined.tolist()))]
     group = np.zeros(len(loops), dtype=np.int64)
     for number, component in enumerate(members):
         group[component] = number

@@ -29,15 +29,26 @@ def unsupported(chain: OdometryChain, loops: Sequence[Edge], max_residual: float
     alone = np.zeros(len(loops), dtype=bool)
     if needed <= 1 or not loops:
         return alone
-    joined = chain.relative([loop.from_key for loop in loops], [loop.to_key for loop in loops])[2]
-    across = sorted(np.flatnonzero(~joined).tolist(), key=lambda i: (loops[i].to_key, loops[i].from_key))
+    across = _across(chain, loops)
+    agreeing = agreements(chain, loops, max_residual)
+    for group in connected(across, [(i, j) for i, j in agreeing.tolist()]):
+        alone[list(group)] = len(group) < needed
+    return alone
+
+
+def agreements(chain: OdometryChain, loops: Sequence[Edge], max_residual: float) -> IntArray:
+    """Pairs (P, 2) of loops that place one map alike in another; each loop is compared with the next ones alone."""
+    across = _across(chain, loops)
     pairs = np.array(
         [(i, j) for place, i in enumerate(across) for j in across[place + 1 : place + 1 + NEXT]], dtype=np.int64
     ).reshape(-1, 2)
-    closing = pairs[_closes(chain, loops, pairs, max_residual)]
-    for group in connected(across, [(i, j) for i, j in closing.tolist()]):
-        alone[list(group)] = len(group) < needed
-    return alone
+    return np.asarray(pairs[_closes(chain, loops, pairs, max_residual)])
+
+
+def _across(chain: OdometryChain, loops: Sequence[Edge]) -> list[int]:
+    """The loops between two maps, in the order of their queries."""
+    joined = chain.joins([loop.from_key for loop in loops], [loop.to_key for loop in loops])
+    return sorted(np.flatnonzero(~joined).tolist(), key=lambda i: (loops[i].to_key, loops[i].from_key))
 
 
 def _closes(chain: OdometryChain, loops: Sequence[Edge], pairs: IntArray, limit: float) -> BoolArray:

@@ -21,7 +21,7 @@ from semslam.runs.recording import Recording, SavedFrontEnd
 from semslam.runs.result import RunResult
 from semslam.runs.results import fill
 from semslam.system.result import SlamResult
-from semslam.types import Motion, RejectionReason, TrackingStatus, Trajectory
+from semslam.types import LoopConstraint, Motion, RejectionReason, TrackingStatus, Trajectory
 
 DETECTOR = "fused"
 """Proposes loops where the first run had no detector."""
@@ -97,9 +97,13 @@ def merge_settings(config: Config) -> Config:
 
 def joining_loops(merge: Merge, slam: SlamResult) -> int:
     """How many accepted loops join the sessions; without one they stay separate maps."""
-    second = {keyframe.id for keyframe in slam.keyframes if keyframe.frame_index >= merge.boundary}
-    pairs = (verdict.constraint for verdict in slam.solution.verdicts if verdict.accepted)
-    return sum((pair.query in second) is not (pair.match in second) for pair in pairs)
+    return sum(v.accepted and _joins(merge, slam, v.constraint) for v in slam.solution.verdicts)
+
+
+def _joins(merge: Merge, slam: SlamResult, loop: LoopConstraint) -> bool:
+    """Whether a loop is between the sessions."""
+    of_second = [slam.keyframes[key].frame_index >= merge.boundary for key in (loop.match, loop.query)]
+    return of_second[0] is not of_second[1]
 
 
 def outcome_of(merge: Merge, slam: SlamResult) -> str:
@@ -107,9 +111,12 @@ def outcome_of(merge: Merge, slam: SlamResult) -> str:
     loops = joining_loops(merge, slam)
     if loops:
         return f"The two sessions are one map: {loops} accepted {'loop joins' if loops == 1 else 'loops join'} them."
-    refused = sum(verdict.reason is RejectionReason.UNSUPPORTED for verdict in slam.solution.verdicts)
-    few = f": the {refused} between them are too few that agree" if refused else ""
-    return f"The two sessions stay separate maps: no loop between them was accepted{few}."
+    reasons = [verdict.reason for verdict in slam.solution.verdicts if _joins(merge, slam, verdict.constraint)]
+    few, two = reasons.count(RejectionReason.UNSUPPORTED), reasons.count(RejectionReason.AMBIGUOUS)
+    why = f": the {few} between them are too few that agree" if few else ""
+    if two:
+        why = f": {two} between them place the one in the other at two places that look alike, and nothing tells which"
+    return f"The two sessions stay separate maps: no loop between them was accepted{why}."
 
 
 def write_merge(

@@ -183,6 +183,16 @@ def test_maps_that_odometry_does_not_join_are_joined_by_loops_that_others_do_not
     assert screen_loops(chain, right, 4.7, 1.5).distances.max() == 0
 
 
+def test_loops_anywhere_that_place_a_map_alike_count_together():
+    rng = np.random.default_rng(8)
+    chain = OdometryChain(range(65), [edge for edge in measure_odometry(TRUTH, rng) if edge.from_key != 39])
+    right, wrong = loops_of(rng)
+    corridor = measure(TRUTH, [(24 - step, 40 + step) for step in range(10)], rng)
+    assert set(screen_loops(chain, [*right, *wrong[15:23]], 4.7, 1.5).reasons) == {"ambiguous"}
+    found = screen_loops(chain, [*right, *corridor, *wrong[15:23]], 4.7, 1.5).reasons
+    assert found == (*(None,) * 25, *("ambiguous",) * 8)
+
+
 def test_loops_into_another_map_say_nothing_of_those_within_one():
     rng = np.random.default_rng(7)
     chain = OdometryChain(range(65), [edge for edge in measure_odometry(TRUTH, rng) if edge.from_key not in (9, 39)])
