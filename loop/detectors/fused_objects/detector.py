@@ -1,0 +1,126 @@
+"""Views and submaps together: a place is known again from the same side by its views, and from any by its objects."""
+
+from collections.abc import Collection, Sequence
+from dataclasses import replace
+from typing import Self
+
+from semslam.config import Config, LoopConfig
+from semslam.loop.detector import Look
+from semslam.loop.detectors.fused.detector import FusedDetector
+from semslam.loop.detectors.fused_objects.belief import SubmapBelief, load_belief
+from semslam.loop.detectors.fused_objects.settings import FusedObjectsConfig
+from semslam.loop.detectors.objects.detector import ObjectsDetector
+from semslam.types import KeyframeView, LoopCandidate
+
+PARTS = ("views", "submaps")
+SEPARATOR = "/"
+
+
+class FusedObjectsDetector:
+    """The candidates of `fused` and those of `objects`, by the probability of either.
+
+    What `objects` states of a match is joined to the probability that its pose is right, learned on rendered houses.
+    A keyframe that views and submaps both propose has the probability that one of them is right, and the submaps'
+    guess of its pose. A share of the candidates is the best by submaps.
+    """
+
+    name = "fused-objects"
+    needs_labels = True
+    Settings = FusedObjectsConfig
+
+    def __init__(
+        self,
+        views: FusedDetector,
+        submaps: ObjectsDetector,
+        belief: SubmapBelief,
+        config: FusedObjectsConfig,
+        loops: LoopConfig,
+    ) -> None:
+        self._views, self._submaps, self._belief = views, submaps, belief
+        self._max_candidates = loops.max_candidates
+        self._spare = min(int(config.submap_share * loops.max_candidates), loops.max_candidates - 1)
+        self._min_probability = config.min_probability if loops.min_score is None else loops.min_score
+
+    @classmethod
+    def from_config(cls, config: Config) -> Self:
+        """Take the settings of both, and its own.
+
+        Raises:
+            ModelError: weights are missing or damaged.
+        """
+        own = config.section(cls.name, cls.Settings)
+        # A minimum score is one of probabilities; the score of `objects` alone is none.
+        submaps = ObjectsDetector.from_config(config.with_changes(loops={"min_score": None}))
+        return cls(FusedDetector.from_config(config), submaps, load_belief(), own, config.loops)
+
+    def query(self, view: KeyframeView) -> list[LoopCandidate]:
+        """Candidates by falling probability; those of submaps hold a guess of the pose.
+
+        Raises:
+            ConfigError: the view holds no labels.
+        """
+        seen = {candidate.match: candidate for candidate in self._views.query(view)}
+        matched = self._believed(self._submaps.query(view))
+        both = {match: _either(candidate, seen[match]) for match, candidate in matched.items() if match in seen}
+        matched |= both
+        by_submap = sorted(matched.values(), key=_rank)[: self._spare]
+        chosen = {candidate.match for candidate in by_submap}
+        others = [each for each in sorted((seen | matched).values(), key=_rank) if each.match not in chosen]
+        candidates = [*by_submap, *others[: self._max_candidates - len(by_submap)]]
+        return [replace(candidate, detector=self.name) for candidate in sorted(candidates, key=_rank)]
+
+    def add(self, view: KeyframeView) -> None:
+        """Remember a keyframe for later queries."""
+        self._views.add(view)
+        self._submaps.add(view)
+
+    def forget(self, ids: Collection[int]) -> None:
+        """See ``Remembering``."""
+        self._views.forget(ids)
+        self._submaps.forget(ids)
+
+    def looks(self) -> tuple[Look, ...]:
+        """See ``Remembering``."""
+        both = zip(self._views.looks(), self._submaps.looks(), strict=True)
+        return tuple(
+            replace(
+                ours[0],
+                arrays={
+                    f"{part}{SEPARATOR}{name}": array
+                    for part, look in zip(PARTS, ours, strict=True)
+                    for name, array in look.arrays.items()
+                },
+            )
+            for ours in both
+        )
+
+    def recall(self, looks: Sequence[Look]) -> None:
+        """See ``Remembering``."""
+        self._views.recall([_part(look, PARTS[0]) for look in looks])
+        self._submaps.recall([_part(look, PARTS[1]) for look in looks])
+
+    def _believed(self, candidates: Sequence[LoopCandidate]) -> dict[int, LoopCandidate]:
+        """The candidates of submaps that are probable enough, by their match, with the probability as their score."""
+        probabilities = self._belief.probabilities(candidates).tolist()
+        return {
+            candidate.match: replace(candidate, score=probability)
+            for candidate, probability in zip(candidates, probabilities, strict=True)
+            if probability >= self._min_probability
+        }
+
+
+def _either(by_submap: LoopCandidate, by_view: LoopCandidate) -> LoopCandidate:
+    """A keyframe that views and submaps propose, each with a probability of its own."""
+    evidence = replace(by_submap.evidence, figures=by_view.evidence.figures | by_submap.evidence.figures)
+    return replace(by_submap, score=1.0 - (1.0 - by_submap.score) * (1.0 - by_view.score), evidence=evidence)
+
+
+def _part(look: Look, part: str) -> Look:
+    """What one of both has kept of a keyframe."""
+    start = f"{part}{SEPARATOR}"
+    own = {name.removeprefix(start): array for name, array in look.arrays.items() if name.startswith(start)}
+    return replace(look, arrays=own)
+
+
+def _rank(candidate: LoopCandidate) -> tuple[float, int]:
+    return -candidate.score, candidate.match

@@ -1,0 +1,10 @@
+"""Settings of the detector ``fused-objects``."""
+
+from semslam.config import Section, setting
+
+
+class FusedObjectsConfig(Section):
+    """Which candidates of submaps are proposed beside those of views."""
+
+    min_probability: float = setting(0.5, "probability of a submap's pose that makes a candidate", ge=0, le=1)
+    submap_share: float = setting(0.4, "share of the candidates that is chosen by submaps", ge=0, lt=1)
