@@ -12,12 +12,17 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import cv2
 import numpy as np
 import pytest
+from hypothesis import settings
 
 from semslam.cli import main
 from semslam.errors import DatasetError
 from semslam.geometry.camera import Intrinsics
 from semslam.geometry.se3 import make_transform
 from semslam.types import Frame, Trajectory
+
+# How long an example takes depends on what else the machine does.
+settings.register_profile("semslam", deadline=None)
+settings.load_profile("semslam")
 
 SHARED = Path(__file__).resolve().parents[2] / "shared"
 

@@ -55,7 +55,7 @@ def error(poses: Mapping[int, FloatArray], truth: FloatArray) -> float:
 
 
 @given(st.integers(0, 100), st.sampled_from([-0.03, -0.01, 0.01, 0.02]))
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=6)
 def test_a_delay_is_found_and_taken_out(seed: int, delay: float) -> None:
     graph, velocities, truth = drawn(seed, delay)
     before = graph.optimize()
@@ -71,7 +71,7 @@ def test_a_delay_is_found_and_taken_out(seed: int, delay: float) -> None:
 
 
 @given(st.integers(0, 100))
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=6)
 def test_where_there_is_none_nothing_is_corrected(seed: int) -> None:
     graph, velocities, _ = drawn(seed, 0.0)
     timed = optimize_at_color(graph, velocities)

@@ -14,7 +14,7 @@ CHI2_95 = 12.591587
 
 
 @given(st.tuples(*[st.floats(-1.2, 1.2)] * 6))
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 def test_errors_are_measured_in_gtsams_tangent(tangent: tuple[float, ...]) -> None:
     xi = np.array(tangent)
     weights = np.diag(np.arange(1.0, 7.0))

@@ -93,7 +93,7 @@ def test_agrees_with_evo_on_noise() -> None:
 
 
 @given(vectors, vectors, st.integers(0, 50))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_a_rigid_motion_of_the_estimate_changes_nothing(rotation: FloatArray, shift: FloatArray, seed: int) -> None:
     truth = wander(seed)
     estimate = disturbed(truth)
@@ -104,7 +104,7 @@ def test_a_rigid_motion_of_the_estimate_changes_nothing(rotation: FloatArray, sh
 
 
 @given(st.floats(0.3, 3.0), st.integers(0, 50))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_sim3_undoes_a_scale(scale: float, seed: int) -> None:
     truth = wander(seed)
     estimate = moved(truth, make_transform(exp_so3([0.3, 1, -2]), [1, 2, 3]), scale)
@@ -206,7 +206,7 @@ def test_interpolation_meets_the_truth_and_halves_the_way() -> None:
 
 
 @given(st.integers(0, 30), st.floats(0.01, 0.99))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_interpolated_rotations_lie_between(seed: int, share: float) -> None:
     truth = wander(seed, count=10)
     stamps = truth.timestamps[:-1] + share / 30

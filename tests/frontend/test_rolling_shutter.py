@@ -52,7 +52,7 @@ def world(seed: int) -> tuple[FloatArray, FloatArray]:
 
 
 @given(st.integers(0, 1000))
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 def test_rectified_keypoints_are_those_of_a_global_shutter(seed: int) -> None:
     points, velocity = world(seed)
     bent = rolling(points, velocity, 0.026)
@@ -64,7 +64,7 @@ def test_rectified_keypoints_are_those_of_a_global_shutter(seed: int) -> None:
 
 
 @given(st.integers(0, 1000))
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 def test_a_rectified_cloud_is_that_of_a_global_shutter(seed: int) -> None:
     points, velocity = world(seed)
     bent = rolling(points, velocity, 0.026).points

@@ -47,7 +47,7 @@ def test_nothing_foreign_is_raised(tmp_path: Path, name: str) -> None:
         target(tmp_path, data)
 
     @given(damaged(seeds(name)))
-    @settings(max_examples=40, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True, database=None)
+    @settings(max_examples=40, suppress_health_check=list(HealthCheck), derandomize=True, database=None)
     def fuzz(data: bytes) -> None:
         target(tmp_path, data)
 

@@ -69,7 +69,7 @@ def test_blank_and_tiny_images_have_no_keypoints(size: tuple[int, int]) -> None:
 
 
 @given(st.integers(0, 70), st.integers(0, 70), st.integers(0, 1000))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_hamming_distance_counts_bits(n: int, m: int, seed: int) -> None:
     rng = np.random.default_rng(seed)
     a, b = (rng.integers(0, 256, (k, 32), dtype=np.uint8) for k in (n, m))
@@ -104,7 +104,7 @@ def scene(seed: int, outliers: float, noise: float) -> tuple[np.ndarray, np.ndar
 
 
 @given(st.integers(0, 10_000))
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 def test_pnp_recovers_the_pose_among_wrong_matches(seed: int) -> None:
     points, pixels, T_ref_cam, wrong = scene(seed, outliers=0.4, noise=0.3)
     found = solve_pnp(points, pixels, CAMERA)

@@ -105,7 +105,7 @@ WHOLE = npz(a=np.arange(100), b=np.ones((3, 4), np.float32))
 
 
 @given(place=st.integers(0, len(WHOLE) - 1), value=st.integers(0, 255), end=st.integers(0, len(WHOLE)))
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_damaged_arrays_raise_nothing_foreign(tmp_path: Path, place: int, value: int, end: int) -> None:
     damaged = bytearray(WHOLE)
     damaged[place] = value
@@ -115,7 +115,6 @@ def test_damaged_arrays_raise_nothing_foreign(tmp_path: Path, place: int, value:
 
 
 @given(st.text())
-@settings(deadline=None)
 def test_no_message_holds_a_control_character(text: str) -> None:
     assert str(SemslamError(text)) == printable(text)
     assert printable(text).isprintable()

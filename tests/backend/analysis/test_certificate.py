@@ -27,7 +27,7 @@ def simulated(count=24, seed=0, sigmas=(0.02,) * 3 + (0.05,) * 3):
     return PosedGraph(dict(enumerate(truth)), (*measure_odometry(truth, rng, 1.0, sigmas), *loops), (0,))
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(seed=st.integers(0, 1000), turn=st.floats(0.01, 0.2), shift=st.floats(0.01, 0.5), flat=st.floats(1.0, 3.0))
 def test_the_optimum_is_certified_and_nothing_lies_below_the_bound(seed, turn, shift, flat):
     solution = judge_graph(simulated(seed=seed, sigmas=(turn, turn, turn * flat, *(shift,) * 3)), PLAIN)

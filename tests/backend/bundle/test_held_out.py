@@ -62,7 +62,7 @@ def test_too_few_landmarks_say_nothing() -> None:
 
 
 @given(st.integers(0, 100))
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=6)
 def test_the_better_poses_are_known(seed: int) -> None:
     truth, observed = room(seed)
     rng = np.random.default_rng(seed)

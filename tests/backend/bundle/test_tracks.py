@@ -50,7 +50,7 @@ def test_nothing_matched() -> None:
 
 
 @given(st.integers(0, 10_000))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_true_matches_give_back_the_landmarks_in_any_order(seed: int) -> None:
     rng = np.random.default_rng(seed)
     identities = {key: rng.permutation(12)[: rng.integers(1, 12)] for key in range(4)}

@@ -41,7 +41,7 @@ def random_graph(seed, count=6):
     return PosedGraph(poses, edges, (keys[0],))
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(seed=st.integers(0, 2**32 - 1), count=st.integers(2, 12))
 def test_what_is_written_is_read_back(tmp_path_factory, seed, count):
     path = tmp_path_factory.mktemp("g2o") / "graph.g2o"
@@ -262,7 +262,7 @@ WORDS = st.sampled_from(
 )
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(words=st.lists(WORDS, max_size=30))
 def test_no_graph_raises_anything_foreign(tmp_path_factory, words):
     path = tmp_path_factory.getbasetemp() / "fuzz.g2o"

@@ -26,7 +26,7 @@ def brute_force(adjacent):
     return 0
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 @given(seed=st.integers(0, 2**32 - 1), count=st.integers(1, 10), density=st.floats(0.1, 0.95))
 def test_the_clique_is_a_largest_one(seed, count, density):
     upper = np.triu(np.random.default_rng(seed).random((count, count)) < density, 1)

@@ -26,7 +26,7 @@ from semslam.types import Cloud, Features, Keyframe, KeyframeView, LoopCandidate
 
 
 @given(st.lists(st.tuples(st.booleans(), st.integers(0, 8)), min_size=1, max_size=60))
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_average_precision_is_scikit_learns_with_ties(pairs: list[tuple[bool, int]]) -> None:
     labels = np.array([label for label, _ in pairs])
     labels[0] = True
@@ -35,7 +35,7 @@ def test_average_precision_is_scikit_learns_with_ties(pairs: list[tuple[bool, in
 
 
 @given(st.lists(st.tuples(st.booleans(), st.integers(0, 8)), min_size=1, max_size=40), st.randoms())
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 def test_the_order_of_pairs_does_not_matter(pairs: list[tuple[bool, int]], random: object) -> None:
     shuffled = list(pairs)
     random.shuffle(shuffled)  # type: ignore[attr-defined]

@@ -32,7 +32,7 @@ def test_sampling_takes_every_sixteenth_pixel_in_range() -> None:
 
 # A wall at 2 m fills the image of 4 m; each 0.1 m sideways is one sampled column of forty.
 @given(st.integers(0, 50))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_sideways_views_of_a_wall_share_what_geometry_says(columns: int) -> None:
     view = make_view(WALL, CAMERA)
     shared = max(40 - columns, 0) / 40
@@ -129,7 +129,7 @@ def test_judgement_of_a_loop(true_offset: float, error: FloatArray, judgement: L
 
 
 @given(st.integers(0, 20))
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 def test_overlap_does_not_depend_on_the_world_frame(seed: int) -> None:
     rng = np.random.default_rng(seed)
     poses = np.stack([make_transform(exp_so3(0.2 * rng.standard_normal(3)), rng.standard_normal(3)) for _ in range(3)])

@@ -156,7 +156,7 @@ def test_a_world_that_changes_is_used_where_it_is_given() -> None:
 
 
 @given(st.lists(st.tuples(st.integers(0, 6), st.booleans()), min_size=1, max_size=30))
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 def test_no_threshold_is_better_than_the_best(pairs: list[tuple[int, bool]]) -> None:
     scores = np.array([score / 6 for score, _ in pairs])
     same = np.array([truth for _, truth in pairs])

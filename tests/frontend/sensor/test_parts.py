@@ -24,7 +24,7 @@ def pose(seconds: float) -> FloatArray:
     return retract(np.eye(4), np.array([0.3 * turn, turn, 0.0, 0.4 * seconds, 0.05 * np.sin(3 * seconds), 0.1]))
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(st.integers(0, 8), st.floats(-0.03, 0.03))
 def test_points_are_where_the_camera_sees_them_a_little_later(image: int, seconds: float) -> None:
     motion = Motion(np.stack([pose(t) for t in TIMES]), TIMES)
@@ -40,7 +40,7 @@ def test_points_are_where_the_camera_sees_them_a_little_later(image: int, second
     assert np.allclose(there.shares.sum(1), 1.0)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(st.floats(-0.05, 0.05), st.floats(-0.05, 0.05), st.floats(12.0, 40.0))
 def test_a_plane_is_fitted_exactly(along_u: float, along_v: float, middle: float) -> None:
     u, v = np.meshgrid(np.arange(320.0), np.arange(240.0))

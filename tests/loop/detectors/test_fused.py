@@ -108,7 +108,7 @@ bags = st.dictionaries(st.integers(0, 30), st.floats(0.1, 1), min_size=1, max_si
 
 
 @given(bags, bags)
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 def test_word_score_is_one_minus_half_the_l1_distance(a: dict[int, float], b: dict[int, float]) -> None:
     dense = np.zeros((2, 31), np.float32)
     for row, bag in zip(dense, (a, b), strict=True):
@@ -194,7 +194,7 @@ def test_relighting_does_what_it_says() -> None:
 
 
 @given(st.floats(-170, 170), st.floats(-50, 50), st.floats(-180, 180))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_roll_is_found_whatever_the_pan_and_tilt(roll: float, tilt: float, pan: float) -> None:
     """Angles in degrees; y points down."""
     axes = [

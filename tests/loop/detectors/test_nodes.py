@@ -100,7 +100,7 @@ def test_three_close_nodes_merge_and_two_do_not() -> None:
 
 
 @given(st.lists(st.tuples(st.integers(0, 600), st.integers(0, 400), st.integers(0, 4)), min_size=1, max_size=20))
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 def test_merging_keeps_area_and_stays_inside(uvd: list[tuple[int, int, int]]) -> None:
     nodes = nodes_at([(float(u), float(v), float(d)) for u, v, d in uvd])
     merged = merge_dense(nodes, 40, 3)

@@ -117,7 +117,7 @@ def furnished(T: FloatArray, seed: int, objects: int = 12) -> Submap:
     )  # fmt: skip
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(
     turn=st.floats(-np.pi, np.pi),
     shift=st.tuples(st.floats(-1.5, 1.5), st.floats(-1.5, 1.5), st.floats(-0.5, 0.5)),
@@ -178,7 +178,7 @@ def test_few_matched_objects_or_keyframes_make_no_candidate(views: list[Keyframe
         detector.add(view)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(seed=st.integers(0, 1000), count=st.integers(0, 200))
 def test_components_are_those_of_each_group(seed: int, count: int) -> None:
     rng = np.random.default_rng(seed)

@@ -92,7 +92,7 @@ points = st.lists(st.tuples(st.integers(0, 640), st.integers(0, 480), st.integer
 
 
 @given(points, st.lists(points, min_size=1, max_size=5))
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_matching_is_one_to_one_per_keyframe_and_the_same_in_bulk(
     query: list[tuple[int, int, int]], keyframes: list[list[tuple[int, int, int]]]
 ) -> None:

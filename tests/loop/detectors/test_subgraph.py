@@ -45,7 +45,7 @@ def test_nodes_are_placed_in_space_and_the_largest_kept() -> None:
     np.testing.assert_allclose(edges.measures[:, 0, 0], 1.0, atol=1e-5)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     turn=st.tuples(*[st.floats(-1, 1)] * 3),
     shift=st.tuples(*[st.floats(-1, 1)] * 3),
@@ -72,7 +72,7 @@ def test_both_matrices_count_by_their_weight() -> None:
     assert similarity(here, larger, edges_only) == pytest.approx(1.0)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(seed=st.integers(0, 10_000))
 def test_similarity_is_symmetric_and_within_bounds(seed) -> None:
     rng = np.random.default_rng(seed)

@@ -24,7 +24,7 @@ def labels(split: int) -> LabelMap:
     return LabelMap(image, NAMES)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(neighbours=st.integers(1, 5), seed=st.integers(0, 100))
 def test_features_are_shared_among_their_nearest_centres(neighbours, seed) -> None:
     projected = np.random.default_rng(seed).normal(size=(20, 4)).astype(np.float32)

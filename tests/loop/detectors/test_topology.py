@@ -60,7 +60,7 @@ def test_neighbours_limit_what_is_related() -> None:
     assert len(relations(row, count_nodes=False, neighbours=1)) == 5
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(
     rows=st.lists(st.tuples(st.integers(1, 6), st.floats(0, 639), st.floats(0, 479), st.floats(0, 5)), max_size=8),
     seed=st.integers(0, 1000),

@@ -30,7 +30,7 @@ def scene(seed: int, count: int, wrong: int, noise: float = 0.0) -> tuple[list[N
 
 
 @given(st.integers(0, 10_000))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_nodes_give_the_pose_among_wrong_ones(seed: int) -> None:
     nodes, T_match_query = scene(seed, 9, 3)
     found = pose_from_nodes(nodes, PINHOLE, PINHOLE)

@@ -70,7 +70,7 @@ def test_what_is_doubtful_is_refused(text: str, reason: str) -> None:
 
 
 @given(st.text(alphabet=st.sampled_from(list("ab01.:-[]{}#&*!?|>'\"%@,\n\t \\~<\x00\x1béé")), max_size=60))
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 def test_no_text_raises_anything_else(text: str) -> None:
     with contextlib.suppress(ConfigError):
         load_yaml(text)
@@ -94,7 +94,7 @@ VALUES = st.recursive(
 
 
 @given(VALUES)
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 def test_what_pyyaml_writes_is_read_as_it_was(value: Any) -> None:
     written = yaml.safe_dump(value)
     assert load_yaml(written) == yaml.safe_load(written)

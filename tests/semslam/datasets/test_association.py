@@ -21,7 +21,7 @@ def reference(first: np.ndarray, second: np.ndarray, window: float) -> list[tupl
 
 
 @given(first=STAMPS, second=STAMPS, window=st.sampled_from([0.005, 0.015, 0.045, 0.155]))
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 def test_it_pairs_as_the_benchmarks_tool_does(first: np.ndarray, second: np.ndarray, window: float) -> None:
     pairs = associate(first.astype(np.float64), second.astype(np.float64), window)
     assert [tuple(pair) for pair in pairs.tolist()] == reference(first, second, window)

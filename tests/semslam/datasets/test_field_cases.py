@@ -154,7 +154,7 @@ def test_most_images_without_a_partner_are_refused(tmp_path: Path) -> None:
 
 
 @given(st.text(alphabet=st.sampled_from(list("01.-e# \tab/\n\x00\x1b,é")), max_size=80))
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_no_list_raises_anything_foreign(tmp_path: Path, text: str) -> None:
     (tmp_path / "camera.yaml").write_text(CAMERA)
     for name in ("rgb.txt", "depth.txt"):

@@ -66,7 +66,7 @@ def test_absurd_positions_are_dropped(tmp_path: Path) -> None:
 
 
 @given(st.text(alphabet=st.sampled_from(list("0123456789.,-e#nai \t\n\x00\x1b")), max_size=120))
-@settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=300, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_no_trajectory_raises_anything_foreign(tmp_path: Path, text: str) -> None:
     (tmp_path / "poses.txt").write_text(text)
     try:
@@ -98,7 +98,7 @@ def test_cameras_that_cannot_be_are_refused(tmp_path: Path, key: str, value: str
 
 
 @given(st.text(alphabet=st.sampled_from(list("widthegfxyc: \n0123456789.-[]{}&*!~\x00\x1b")), max_size=100))
-@settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=200, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_no_camera_file_raises_anything_foreign(tmp_path: Path, text: str) -> None:
     (tmp_path / "camera.yaml").write_text(CAMERA + text)
     try:

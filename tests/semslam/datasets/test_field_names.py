@@ -65,7 +65,7 @@ def test_numbers_that_mostly_do_not_meet_are_refused(tmp_path: Path) -> None:
         st.text(alphabet=st.sampled_from(list("01289.-_af")), min_size=1, max_size=12), min_size=1, max_size=5
     )
 )
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_no_names_raise_anything_foreign(tmp_path_factory: pytest.TempPathFactory, names: list[str]) -> None:
     folder = tmp_path_factory.mktemp("names")
     for kind in ("color", "depth"):

@@ -221,7 +221,7 @@ def test_depth_may_have_64_bits_and_other_kinds_are_named(tmp_path: Path) -> Non
 
 @pytest.mark.parametrize("suffix", [".png", ".jpg", ".tiff", ".bmp", ".ppm"])
 @given(place=st.floats(0, 1, exclude_max=True), value=st.integers(0, 255), end=st.floats(0, 1))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_no_damage_raises_anything_foreign(suffix: str, place: float, value: int, end: float) -> None:
     data = bytearray(cv2.imencode(suffix, COLOR)[1].tobytes())
     data[int(place * min(len(data), 200))] = value

@@ -17,7 +17,7 @@ from semslam.errors import DatasetError
     rate=st.floats(5.0, 100.0),
     seed=st.integers(0, 1000),
 )
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 def test_the_unit_of_images_is_recognised(unit: TimeUnit, start: float, rate: float, seed: int) -> None:
     jitter = np.random.default_rng(seed).uniform(0.8, 1.2, 40)
     stamps = (start + np.cumsum(jitter / rate)) * unit.per_second
@@ -66,7 +66,6 @@ def test_frame_numbers_are_whole_and_evenly_spaced(stamps: list[float], count: b
 
 
 @given(st.lists(st.floats(allow_nan=True, allow_infinity=True), max_size=20))
-@settings(deadline=None)
 def test_no_numbers_raise_anything_else(stamps: list[float]) -> None:
     with contextlib.suppress(DatasetError):
         to_seconds(stamps, "rgb.txt", [])

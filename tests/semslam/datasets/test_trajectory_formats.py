@@ -26,7 +26,7 @@ def some(seed: int, count: int, start: float = 1305031102.0) -> Trajectory:
 
 
 @pytest.mark.parametrize("form", TrajectoryFormat)
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(seed=st.integers(0, 2**32 - 1), count=st.integers(1, 6))
 def test_what_is_written_is_recognised_and_reads_back(
     tmp_path_factory: pytest.TempPathFactory, form: TrajectoryFormat, seed: int, count: int

@@ -96,7 +96,7 @@ def test_missing_and_binary_files_are_refused(tmp_path: Path) -> None:
     start=st.floats(0, 2e9),
     seed=st.integers(0, 2**32 - 1),
 )
-@settings(max_examples=50, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=50, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_what_is_written_is_read_again(tmp_path: Path, steps: np.ndarray, start: float, seed: int) -> None:
     rng = np.random.default_rng(seed)
     stamps = np.unique(np.round(start + np.cumsum(steps), 6))

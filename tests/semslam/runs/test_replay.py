@@ -166,7 +166,7 @@ def test_what_cannot_be_replayed_is_one_sentence(semslam: Call, saved: Path, tmp
     assert not (tmp_path / "out").exists()
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(
     data=st.data(),
     count=st.integers(1, 6),
