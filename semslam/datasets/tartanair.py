@@ -111,7 +111,7 @@ def _read_array(path: Path) -> Float32Array:
     data = read_bytes(path, "The depth array", DatasetError, MAX_FILE_BYTES)
     try:
         raw = np.load(BytesIO(data), allow_pickle=False)
-    except (ValueError, EOFError, OSError) as error:
+    except Exception as error:  # numpy's parser of headers raises errors of many kinds
         raise DatasetError(f"The depth array {path} cannot be read: it is damaged or no array.") from error
     if not isinstance(raw, np.ndarray) or raw.ndim != 2 or not np.issubdtype(raw.dtype, np.floating):
         raise DatasetError(f"The depth array {path} is no image of floating-point metres.")

@@ -1,12 +1,12 @@
 """A sample of each verified loop's inlier matches, stored for the report."""
 
-import zipfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from semslam.errors import ResultsError
+from semslam.files import read_arrays
 from semslam.types import FloatArray, Keyframe, LoopConstraint, Verification
 
 FILE = "inliers.npz"
@@ -41,15 +41,15 @@ def read_inliers(directory: Path) -> Mapping[int, FloatArray]:
     path = directory / FILE
     if not path.exists():
         return {}
+    arrays = read_arrays(path, "The file of inliers", ResultsError)
     try:
-        with np.load(path, allow_pickle=False) as file:
-            entries, counts, pixels = file["entries"], file["counts"], file["pixels"].astype(np.float64)
+        entries, counts, pixels = arrays["entries"], arrays["counts"], arrays["pixels"].astype(np.float64)
         if len(entries) != len(counts) or counts.sum() != len(pixels) or pixels.shape[1:] != (4,):
             raise ValueError("lengths differ")
         return (
             dict(zip(entries.tolist(), np.split(pixels, np.cumsum(counts)[:-1]), strict=True)) if len(entries) else {}
         )
-    except (OSError, EOFError, KeyError, ValueError, zipfile.BadZipFile) as error:
+    except (KeyError, TypeError, ValueError) as error:
         raise ResultsError(f"The inliers {path} are damaged.") from error
 
 

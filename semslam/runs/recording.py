@@ -1,6 +1,5 @@
 """A saved front end, from which detection, verification and back end can be repeated without tracking."""
 
-import zipfile
 import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -13,6 +12,7 @@ import numpy.typing as npt
 from semslam.config import Config, load_saved_config
 from semslam.datasets.dataset import Dataset
 from semslam.errors import ConfigError, DatasetError, ResultsError
+from semslam.files import read_arrays
 from semslam.geometry.se3 import is_rigid
 from semslam.plugins import load
 from semslam.runs.manifest import read_manifest
@@ -186,9 +186,8 @@ def read_recording(directory: Path) -> Recording:
     path = directory / RECORDING
     if not path.is_file():
         raise ResultsError(f"{directory} cannot be replayed: it has no {RECORDING}.")
+    arrays = read_arrays(path, "The saved front end", ResultsError)
     try:
-        with np.load(path, allow_pickle=False) as file:
-            arrays = {name: file[name] for name in file.files}
         return Recording(
             frames=_frames(arrays),
             unreadable=tuple(str(text) for text in arrays["unreadable"]),
@@ -197,7 +196,7 @@ def read_recording(directory: Path) -> Recording:
         )
     except KeyError as error:
         raise ResultsError(f"The saved front end in {directory} was written by another version.") from error
-    except (OSError, EOFError, IndexError, TypeError, ValueError, zipfile.BadZipFile, zlib.error) as error:
+    except (IndexError, TypeError, ValueError) as error:
         raise ResultsError(f"The saved front end in {directory} is damaged.") from error
 
 
