@@ -56,10 +56,11 @@ def calibrate_command(
     with bar(dataset.name, len(dataset)) as update:
         estimate = calibrate(_readable(dataset, update), STRETCHES, dataset.ground_truth)
     out.print(_table(dataset.name, estimate))
-    if not estimate.is_determined:
+    stated = _setup(sequence, dataset, chosen)
+    setup = estimate.applied(stated)
+    if not estimate.is_determined and setup == stated:
         out.print("The recording determines nothing of it: the camera moves too evenly. No file is written.")
         raise typer.Exit(UNDETERMINED)
-    setup = estimate.applied(_setup(sequence, dataset, chosen))
     write_camera(out_file, setup.intrinsics, setup.depth_scale)
     out.print(f"Camera: {out_file}; use it with --set dataset.camera={out_file}.", soft_wrap=True)
 

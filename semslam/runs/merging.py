@@ -115,7 +115,7 @@ def outcome_of(merge: Merge, slam: SlamResult) -> str:
     few, two = reasons.count(RejectionReason.UNSUPPORTED), reasons.count(RejectionReason.AMBIGUOUS)
     why = f": the {few} between them are too few that agree" if few else ""
     if two:
-        why = f": {two} between them place the one in the other at two places that look alike, and nothing tells which"
+        why = f": {two} between them place the one in the other at two places, and no other evidence decides"
     return f"The two sessions stay separate maps: no loop between them was accepted{why}."
 
 

@@ -196,7 +196,7 @@ def read_recording(directory: Path) -> Recording:
         )
     except KeyError as error:
         raise ResultsError(f"The saved front end in {directory} was written by another version.") from error
-    except (IndexError, TypeError, ValueError) as error:
+    except (IndexError, OverflowError, TypeError, ValueError) as error:
         raise ResultsError(f"The saved front end in {directory} is damaged.") from error
 
 

@@ -2,18 +2,20 @@
 
 from collections.abc import Collection, Sequence
 from dataclasses import replace
-from typing import Self
+from typing import Any, Self
+
+import numpy.typing as npt
 
 from semslam.config import Config, LoopConfig
-from semslam.loop.detector import Look
+from semslam.loop.detector import Arrays, Look
 from semslam.loop.detectors.fused.detector import FusedDetector
 from semslam.loop.detectors.fused_objects.belief import SubmapBelief, load_belief
 from semslam.loop.detectors.fused_objects.settings import FusedObjectsConfig
 from semslam.loop.detectors.objects.detector import ObjectsDetector
 from semslam.types import KeyframeView, LoopCandidate
 
-PARTS = ("views", "submaps")
-SEPARATOR = "/"
+VIEWS, SUBMAPS = "views/", "submaps/"
+"""What the names of each part's arrays begin with in what is kept of a keyframe."""
 
 
 class FusedObjectsDetector:
@@ -83,21 +85,13 @@ class FusedObjectsDetector:
         """See ``Remembering``."""
         both = zip(self._views.looks(), self._submaps.looks(), strict=True)
         return tuple(
-            replace(
-                ours[0],
-                arrays={
-                    f"{part}{SEPARATOR}{name}": array
-                    for part, look in zip(PARTS, ours, strict=True)
-                    for name, array in look.arrays.items()
-                },
-            )
-            for ours in both
+            replace(seen, arrays=_named(VIEWS, seen.arrays) | _named(SUBMAPS, matched.arrays)) for seen, matched in both
         )
 
     def recall(self, looks: Sequence[Look]) -> None:
         """See ``Remembering``."""
-        self._views.recall([_part(look, PARTS[0]) for look in looks])
-        self._submaps.recall([_part(look, PARTS[1]) for look in looks])
+        self._views.recall([_part(look, VIEWS) for look in looks])
+        self._submaps.recall([_part(look, SUBMAPS) for look in looks])
 
     def _believed(self, candidates: Sequence[LoopCandidate]) -> dict[int, LoopCandidate]:
         """The candidates of submaps that are probable enough, by their match, with the probability as their score."""
@@ -115,10 +109,13 @@ def _either(by_submap: LoopCandidate, by_view: LoopCandidate) -> LoopCandidate:
     return replace(by_submap, score=1.0 - (1.0 - by_submap.score) * (1.0 - by_view.score), evidence=evidence)
 
 
+def _named(part: str, arrays: Arrays) -> dict[str, npt.NDArray[Any]]:
+    return {f"{part}{name}": array for name, array in arrays.items()}
+
+
 def _part(look: Look, part: str) -> Look:
     """What one of both has kept of a keyframe."""
-    start = f"{part}{SEPARATOR}"
-    own = {name.removeprefix(start): array for name, array in look.arrays.items() if name.startswith(start)}
+    own = {name.removeprefix(part): array for name, array in look.arrays.items() if name.startswith(part)}
     return replace(look, arrays=own)
 
 

@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from semslam.datasets.camera_file import read_camera
+from semslam.frontend.sensor.estimate import SensorEstimate, a_time
 from tests.conftest import Call
 
 ROOM = "synthetic:room?width=160&readout=0.026&delay=0.01&stated=0"
@@ -26,6 +27,20 @@ def test_too_short_a_recording_is_undetermined_and_writes_nothing(semslam: Call,
     assert done.code == 1
     assert "undetermined" in done.out
     assert not file.exists()
+
+
+def test_what_is_known_roughly_is_shown_and_written_where_it_is_far_from_what_is_stated(
+    semslam: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def estimated(milliseconds: float) -> str:
+        found = SensorEstimate(depth_readout=a_time(milliseconds / 1e3, 2e-3), stretches=5)
+        monkeypatch.setattr("semslam.frontend.sensor.calibration.calibrate", lambda *_: found)
+        return str(semslam("calibrate", ROOM, "--end", "5", "--out", tmp_path / f"{milliseconds:.0f}.yaml").out)
+
+    assert "roughly" in estimated(5)
+    assert not (tmp_path / "5.yaml").exists()
+    assert "roughly" in estimated(25)
+    assert read_camera(tmp_path / "25.yaml").intrinsics.depth_readout == pytest.approx(0.025)
 
 
 def test_a_file_that_is_there_stays(semslam: Call, tmp_path: Path) -> None:

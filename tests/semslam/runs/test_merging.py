@@ -2,6 +2,8 @@
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,9 +14,11 @@ from semslam.datasets.sessions import SESSIONS
 from semslam.datasets.synthetic import write_tum
 from semslam.datasets.tum_format import read_trajectory
 from semslam.eval.trajectory import score_trajectory
+from semslam.runs.merging import outcome_of
 from semslam.runs.pipeline import run
 from semslam.runs.results import read_run, write_run
 from semslam.runs.saved_views import open_saved
+from semslam.types import RejectionReason
 from tests.conftest import Call, WallDataset
 
 SCENE = "synthetic:room?frames={frames}&noise=0&width=240"
@@ -112,6 +116,25 @@ def test_different_places_stay_two_maps(
     # Two sequences need not share a world: only the first one's ground truth is used.
     assert both.ground_truth is not None
     assert both.ground_truth.timestamps[-1] < 26
+
+
+def test_the_outcome_states_why_sessions_stay_apart() -> None:
+    boundary, keyframes = 10, [SimpleNamespace(frame_index=index) for index in (0, 5, 10, 15)]
+
+    def outcome(*verdicts: tuple[int, int, RejectionReason | None]) -> str:
+        judged = [
+            SimpleNamespace(constraint=SimpleNamespace(match=a, query=b), accepted=why is None, reason=why)
+            for a, b, why in verdicts
+        ]
+        slam: Any = SimpleNamespace(keyframes=keyframes, solution=SimpleNamespace(verdicts=judged))
+        merge: Any = SimpleNamespace(boundary=boundary)
+        return outcome_of(merge, slam)
+
+    ambiguous, unsupported = RejectionReason.AMBIGUOUS, RejectionReason.UNSUPPORTED
+    assert "1 accepted loop joins" in outcome((0, 2, None), (1, 3, ambiguous))
+    assert "2 between them place the one in the other" in outcome((0, 2, ambiguous), (1, 3, ambiguous), (0, 1, None))
+    assert "the 1 between them are too few" in outcome((0, 2, unsupported), (2, 3, unsupported))
+    assert outcome((0, 1, None), (2, 3, ambiguous)).endswith("no loop between them was accepted.")
 
 
 def test_what_cannot_be_merged_is_refused(semslam: Call, halves: tuple[Path, Path], tmp_path: Path) -> None:
