@@ -198,7 +198,7 @@ def test_a_recording_reads_back(
                 np.testing.assert_array_equal(getattr(one.observations, field), getattr(other.observations, field))
 
 
-@pytest.mark.parametrize("name", ["T_prev_cur", "covariance", "timestamp", "landmarks", "status"])
+@pytest.mark.parametrize("name", ["T_prev_cur", "covariance", "timestamp", "landmarks", "status", "checksum"])
 def test_a_damaged_recording_is_named(tmp_path: Path, name: str) -> None:
     rng = np.random.default_rng(0)
     frames = tuple(_frame(index, 3, rng) for index in range(3))
@@ -208,6 +208,8 @@ def test_a_damaged_recording_is_named(tmp_path: Path, name: str) -> None:
     damaged = arrays[name].astype(np.float64) * np.nan if name != "status" else np.array(["ok", "fine", "ok"])
     if name == "landmarks":
         damaged = arrays[name][1:]
+    if name == "checksum":
+        damaged = np.array(np.inf)
     np.savez(tmp_path / "frontend.npz", **arrays | {name: damaged})
     with pytest.raises(ResultsError, match="is damaged"):
         read_recording(tmp_path)
