@@ -5,6 +5,7 @@ import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Literal
 
 import matplotlib.style
 import numpy as np
@@ -19,11 +20,12 @@ from semslam.errors import ConfigError, printable
 
 DPI = 130
 FONT, FONT_SIZE = "DejaVu Sans", 9.5
+TITLES: Literal["left"] = "left"
 STYLE: dict[str, object] = {
     "text.parse_math": False,  # a dollar in a name is a dollar
     "axes.titlesize": "large",
     "axes.titleweight": "bold",
-    "axes.titlelocation": "left",
+    "axes.titlelocation": TITLES,
     "axes.titlepad": 10,
     "axes.edgecolor": "#888888",
     "axes.labelcolor": "#333333",
@@ -103,6 +105,8 @@ def render(draw: Callable[[Figure], None], size: tuple[float, float], settings: 
     with matplotlib.style.context(STYLE | fonts, after_reset=True):
         figure = Figure(figsize=settings.size or size, dpi=DPI, layout="constrained")
         draw(figure)
+        for axes in figure.axes:
+            axes.set_title(axes.get_title(TITLES), wrap=True)  # a sequence's name may be long
         if settings.size is not None and settings.size[0] < size[0]:
             _thin(figure, settings.size[0] / size[0])
         buffer = io.BytesIO()

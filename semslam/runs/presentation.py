@@ -16,6 +16,7 @@ from semslam.eval.report.page import make_report
 from semslam.eval.report.plots import draw_run
 from semslam.eval.report.verdict import SAME_FRAMES, Outcome, judge_run
 from semslam.eval.style import PLAIN, PictureSettings
+from semslam.loop.detector import NoLoops
 from semslam.runs.inliers import read_inliers
 from semslam.runs.keyframe_images import image_reader
 from semslam.runs.manifest import read_manifest
@@ -50,8 +51,9 @@ def write_plots(run: SavedRun, directory: Path, settings: PictureSettings = PLAI
 def run_drawing(run: SavedRun) -> RunDrawing:
     """The trajectories and loops of a saved run, for plots."""
     metrics = run.metrics
+    loops = "no loops" if metrics.detector == NoLoops.name else f"{metrics.detector} loops"
     return RunDrawing(
-        title=f"{metrics.sequence}: {metrics.odometry} odometry, {metrics.detector} loops",
+        title=f"{metrics.sequence}: {metrics.odometry} odometry, {loops}",
         odometry=run.odometry,
         optimised=run.trajectory,
         truth=run.ground_truth,
