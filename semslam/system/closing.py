@@ -51,7 +51,7 @@ class KeyframeAnswer:
         T_world_odom: (4, 4) takes poses of the keyframe's map from odometry's frame to the world as the loops have it.
         accepted: match and query of the loops that the live graph follows from this keyframe on.
         withdrawn: the same of those that it no longer follows.
-        labels: the keyframe's segmentation without confidences, where one was made.
+        labels: the keyframe's segmentation without confidences and features, where one was made.
         calls: when each stage was done.
         usage: of the process in which loops are closed, so far.
     """
@@ -112,6 +112,7 @@ class LoopClosing:
                     self._graph.add_loop(verification)
             change = self._graph.update()
             T_world_odom = self._graph.correction(keyframe.id)
+        labels = self._search.labels
         return KeyframeAnswer(
             keyframe=keyframe.id,
             details=keyframe.details,
@@ -120,7 +121,7 @@ class LoopClosing:
             T_world_odom=T_world_odom,
             accepted=change.accepted,
             withdrawn=change.withdrawn,
-            labels=None if self._search.labels is None else replace(self._search.labels, confidence=None),
+            labels=None if labels is None else replace(labels, confidence=None, features=None),
             calls=self._stopwatch.take(),
             usage=usage_now(),
         )

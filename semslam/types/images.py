@@ -40,8 +40,10 @@ class LabelMap:
         labels: (H, W) uint8, indices into ``names``; 0 is void.
         names: class names; ``names[0]`` is "void".
         confidence: (H, W) float32 in 0..1, or None where the segmenter has none.
+        features: (h, w, 96) float32, ``Encoding.middle`` of the image, where the network has just computed it.
     """
 
     labels: UInt8Array
     names: tuple[str, ...]
     confidence: Float32Array | None = None
+    features: Float32Array | None = None

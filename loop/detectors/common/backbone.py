@@ -3,15 +3,14 @@
 from dataclasses import dataclass
 from typing import Self
 
-import numpy as np
 import onnx
 from onnx.utils import Extractor
 
 from semslam.config import Config
 from semslam.errors import ModelError
 from semslam.loop.segmentation.decoding import input_size, shrink
-from semslam.loop.segmentation.segmenters.onnx import FEATURES, IMAGE, load_graph, open_session
-from semslam.types import Float32Array, UInt8Array
+from semslam.loop.segmentation.segmenters.onnx import FEATURES, IMAGE, image_rows, load_graph, open_session
+from semslam.types import Float32Array, KeyframeView, UInt8Array
 
 AFTER_ENCODER = "/network/aspp/point/conv/Conv"
 """The node that reads the encoder's last output, which the graph gives no name of its own."""
@@ -37,7 +36,7 @@ class Backbone:
         graph: the segmentation network.
         size: width and height of the network's input.
         threads: inference threads.
-        deep: whether ``encode`` is wanted; without, ``encode_middle`` takes two thirds of the time.
+        deep: whether ``encode`` is wanted; without, ``middle`` takes two thirds of the time.
 
     Attributes:
         size: width and height of the network's input.
@@ -73,10 +72,12 @@ class Backbone:
         middle, high = self._run(color)
         return Encoding(middle, high)
 
-    def encode_middle(self, color: UInt8Array) -> Float32Array:
-        """``Encoding.middle`` alone."""
-        return self._run(color)[0]
+    def middle(self, view: KeyframeView) -> Float32Array:
+        """``Encoding.middle`` of a keyframe's image alone, as its segmentation left it where it did."""
+        if view.labels is not None and view.labels.features is not None:
+            return view.labels.features
+        return self._run(view.color)[0]
 
     def _run(self, color: UInt8Array) -> list[Float32Array]:
         outputs = self._session.run(None, {IMAGE: shrink(color, self.size)[None]})
-        return [np.ascontiguousarray(np.asarray(out, dtype=np.float32)[0].transpose(1, 2, 0)) for out in outputs]
+        return [image_rows(out) for out in outputs]

@@ -125,7 +125,7 @@ class ObjectsDetector(RememberingDetector[Submap]):
             last = self._recent[-1]
             step = view.keyframe.T_odom_cam[:3, 3] - last.keyframe.T_odom_cam[:3, 3]
             travelled = last.travelled + float(np.linalg.norm(step))
-        middle = self._backbone.encode_middle(view.color)
+        middle = self._backbone.middle(view)
         looks: Float32Array = middle.reshape(-1, LOOK_CHANNELS) @ self._directions
         return label_cloud(view, looks, middle.shape[:2], self._config.max_depth, travelled)
 
@@ -172,14 +172,10 @@ class ObjectsDetector(RememberingDetector[Submap]):
         ours = tuple(i for i in self._members(query, view.keyframe.timestamp) if i != anchor)
         theirs = self._members(match, float(self._timeline.stamps[at]))
         guess = SubmapGuess(tuple(map(tuple, T.tolist())), (*ours, anchor), theirs)
-        objects = tuple(
-            ObjectPair(
-                _group_name(int(query.objects.groups[i])),
-                _place(query.T_cam_level, query.objects.centroids[i]),
-                _place(match.T_cam_level, match.objects.centroids[j]),
-            )
-            for i, j in found.objects
-        )
+        i, j = found.objects.T
+        names = [_group_name(group) for group in query.objects.groups[i].tolist()]
+        places = _places(query.T_cam_level, query.objects.centroids[i])
+        objects = tuple(map(ObjectPair, names, places, _places(match.T_cam_level, match.objects.centroids[j])))
         figures = {
             "matched_objects": float(len(found.objects)),
             "matched_walls": float(len(found.walls)),
@@ -194,6 +190,5 @@ def _group_name(group: int) -> str:
     return GROUP_LIST[group] if group < len(GROUP_LIST) else f"class {group}"
 
 
-def _place(T_cam_level: FloatArray, centroid: Float32Array) -> tuple[float, float, float]:
-    x, y, z = transform_points(T_cam_level, centroid[None].astype(np.float64))[0].tolist()
-    return x, y, z
+def _places(T_cam_level: FloatArray, centroids: Float32Array) -> list[tuple[float, float, float]]:
+    return [(x, y, z) for x, y, z in transform_points(T_cam_level, centroids.astype(np.float64)).tolist()]

@@ -51,7 +51,7 @@ class TnnLostDetector(DescriptorDetector):
         Raises:
             ConfigError: the view holds no labels.
         """
-        middle = self._backbone.encode_middle(view.color)
+        middle = self._backbone.middle(view)
         return describe_features(middle, labels_of(view, self.name), self._codebook, self._config)
 
 

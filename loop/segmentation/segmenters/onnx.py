@@ -2,10 +2,12 @@
 
 import hashlib
 from collections.abc import Collection
+from dataclasses import replace
 from pathlib import Path
 from typing import Self
 
 import numpy as np
+import numpy.typing as npt
 import onnxruntime
 
 from semslam.config import Config
@@ -59,8 +61,14 @@ class OnnxSegmenter:
     def segment(self, color: UInt8Array, depth: Float32Array | None = None, frame_index: int | None = None) -> LabelMap:
         """Label an RGB image (H, W, 3) uint8; ``depth`` is used where the network sees depth."""
         pictures = network_input(self._session, color, depth, self._size)
-        logits = self._session.run([LOGITS], pictures)[0]
-        return decode(np.asarray(logits)[0], (color.shape[1], color.shape[0]), self._min_confidence)
+        logits, features = self._session.run([LOGITS, FEATURES], pictures)
+        labels = decode(np.asarray(logits)[0], (color.shape[1], color.shape[0]), self._min_confidence)
+        return replace(labels, features=image_rows(features))
+
+
+def image_rows(output: npt.ArrayLike) -> Float32Array:
+    """Channels last (h, w, C) of the network's features (1, C, h, w) of one image."""
+    return np.ascontiguousarray(np.asarray(output, dtype=np.float32)[0].transpose(1, 2, 0))
 
 
 def load_graph(weights: Path | None, precision: str) -> bytes:

@@ -1,5 +1,7 @@
 """What is special to each segmenter; what holds for all of them stands in the contract."""
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
@@ -13,7 +15,9 @@ from semslam.loop.segmentation.classes import NYU40_NAMES
 from semslam.loop.segmentation.decoding import decode
 from semslam.loop.segmentation.overlay import draw_overlay
 from semslam.loop.segmentation.segmenters.folder import FolderSegmenter
+from semslam.loop.segmentation.segmenters.onnx import OnnxSegmenter
 from semslam.loop.segmentation.shipped import CHECKPOINT
+from semslam.testing.scenes import place
 from semslam.types import LabelMap
 
 
@@ -139,7 +143,18 @@ def test_features_are_a_sixteenth():
     assert first.middle.dtype == np.float32
     assert first.middle.std() > 0
     assert np.array_equal(first.middle, again.middle)
-    assert np.array_equal(first.middle, Backbone.from_config(load_config(), deep=False).encode_middle(some_image()))
+
+
+@pytest.mark.parametrize("precision", ["int8", "float32"])
+def test_features_that_the_segmentation_leaves_are_those_of_the_encoder_to_the_bit(precision):
+    config = load_config(overrides={"segmentation": {"precision": precision}})
+    view = place(0, 0)
+    labels = OnnxSegmenter.from_config(config).segment(view.color)
+    middle = Backbone.from_config(config).encode(view.color).middle
+    assert np.array_equal(labels.features, middle)
+    shallow = Backbone.from_config(config, deep=False)
+    for given in (labels, replace(labels, features=None), None):
+        assert np.array_equal(shallow.middle(replace(view, labels=given)), middle)
 
 
 def test_overlay_has_a_legend_of_what_is_there():
