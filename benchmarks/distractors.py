@@ -34,6 +34,7 @@ from semslam.loop.detector import LoopDetector, Remembering
 from semslam.loop.segmentation.build import build_segmenter
 from semslam.loop.verification.submaps import ends_of
 from semslam.loop.verification.verifier import LoopVerifier, build_verifier
+from semslam.runtime.threads import one_blas_thread
 from semslam.types import Frame, Keyframe, KeyframeView, LoopConstraint, Transform
 
 PAUSE = 1000.0
@@ -135,7 +136,8 @@ def ask(
 ) -> None:  # fmt: skip
     """Query the database, and verify what is proposed."""
     start = process_time()
-    candidates = detector.query(view)
+    with one_blas_thread():
+        candidates = detector.query(view)
     tally.spent.append(1000 * (process_time() - start))
     for candidate in candidates:
         across = shots[candidate.query][0] != shots[candidate.match][0]

@@ -20,6 +20,7 @@ from semslam.loop.verification.submaps import ends_of
 from semslam.loop.verification.verifier import LoopVerifier, build_verifier
 from semslam.plugins import load
 from semslam.runtime.stopwatch import Stopwatch
+from semslam.runtime.threads import one_blas_thread
 from semslam.types import (
     Frame,
     Keyframe,
@@ -111,7 +112,7 @@ class LoopSearch:
         """
         view = self._view(keyframe, frame, labels)
         self._labels = view.labels
-        with self._stopwatch.stage("query"):
+        with self._stopwatch.stage("query"), one_blas_thread():
             candidates = self._detector.query(view)
             self._detector.add(view)
         self._follower.add(keyframe, self._keyframes[-1] if self._keyframes else None)
@@ -129,7 +130,9 @@ class LoopSearch:
 
     def find(self, keyframe: Keyframe, frame: Frame, labels: LabelMap | None = None) -> list[Verification]:
         """Look for a place without taking the keyframe in; arguments and result are those of ``search``."""
-        candidates = self._detector.query(self._view(keyframe, frame, labels))
+        view = self._view(keyframe, frame, labels)
+        with one_blas_thread():
+            candidates = self._detector.query(view)
         known = [*self._keyframes, keyframe]
         outcomes = [self._verifier.verify(*ends_of(candidate, known), candidate) for candidate in candidates]
         return [at_candidate(one, known) if isinstance(one, LoopConstraint) else one for one in outcomes]
