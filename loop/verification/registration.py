@@ -5,9 +5,11 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from semslam.errors import ConfigError
 from semslam.geometry.se3 import transform_points
+from semslam.loop.verification.free_space import BoolArray
 from semslam.runtime.threads import one_open3d_thread
 from semslam.types import Cloud, FloatArray, IntArray, Transform
 
@@ -16,6 +18,8 @@ CONVERGED = 1e-4
 """Relative change of fitness and of the residual at which an iteration stops: a fifth of a millimetre on real pairs."""
 COARSE_STRIDE = 4
 """All passes but the last use every fourth source point; they only bring the clouds close enough for the last."""
+ALIKE = float(np.cos(np.radians(45.0)))
+"""Cosine of the angle between two normals, below which points are not of one surface."""
 ICP_KINDS = ("point_to_plane", "generalized", "colored")
 GICP_EPSILON = 1e-3
 """Variance along the normal over that in the plane; Open3D's default."""
@@ -72,6 +76,7 @@ def refine(
     T_target_source: Transform,
     distances: tuple[float, ...],
     kind: str = "point_to_plane",
+    by_normals: bool = False,
 ) -> FloatArray:
     """ICP with Tukey's loss, coarse to fine.
 
@@ -82,6 +87,9 @@ def refine(
         distances: metres, farthest correspondence of each pass; also the loss's width.
         kind: "point_to_plane" (Chen and Medioni, 1992); "generalized" (Segal et al., RSS 2009), plane to plane;
             "colored" (Park et al., ICCV 2017), which also compares colours and needs them in both clouds.
+        by_normals: before each pass, leave out source points whose nearest point of the target faces another way:
+            the other face of a wall that was seen from both sides, laid onto the first, shifts everything by its
+            thickness.
 
     Returns:
         (4, 4) T_target_source; the guess where nothing corresponds.
@@ -96,11 +104,26 @@ def refine(
     T = T_target_source
     with one_open3d_thread():
         moving, fixed = source.open3d, target.open3d
-        for distance in distances[:-1]:
-            T = _icp_pass(moving.uniform_down_sample(COARSE_STRIDE), fixed, T, distance, kind)
-        for distance in distances[-1:]:
-            T = _icp_pass(moving, fixed, T, distance, kind)
+        for number, distance in enumerate(distances, 1):
+            used = moving if number == len(distances) else moving.uniform_down_sample(COARSE_STRIDE)
+            if by_normals:
+                used = used.select_by_index(_facing_alike(used, target, T, distance))
+            T = _icp_pass(used, fixed, T, distance, kind)
     return T
+
+
+def _facing_alike(moving: Any, target: Surface, T: Transform, distance: float) -> IntArray:
+    """Indices of the points of an Open3D cloud but those whose nearest point of the target faces another way."""
+    off, nearest = target.nearest(transform_points(T, np.asarray(moving.points)), distance)
+    met = np.flatnonzero(np.isfinite(off))
+    kept = np.ones(len(off), dtype=bool)
+    kept[met] = _alike(np.asarray(moving.normals)[met], target.cloud.normals[nearest[met]], T)
+    return np.flatnonzero(kept)
+
+
+def _alike(normals: npt.NDArray[np.floating], others: npt.NDArray[np.floating], T: Transform) -> BoolArray:
+    """(N,) whether unit normals (N, 3), turned by T, point about where others (N, 3) do."""
+    return np.asarray(((normals @ T[:3, :3].T) * others).sum(axis=1) > ALIKE)
 
 
 def _icp_pass(moving: Any, fixed: Any, T: Transform, distance: float, kind: str) -> FloatArray:
@@ -122,13 +145,17 @@ def _icp_pass(moving: Any, fixed: Any, T: Transform, distance: float, kind: str)
     return np.array(found.transformation) if found.fitness > 0 else T
 
 
-def measure_fit(source: Surface, target: Surface, T_target_source: Transform, distance: float) -> Fit:
-    """Find the source points that lie within ``distance`` metres of the target."""
+def measure_fit(
+    source: Surface, target: Surface, T_target_source: Transform, distance: float, by_normals: bool = False
+) -> Fit:
+    """Find the source points within ``distance`` metres of the target; by normals: that face the same way too."""
     if not len(source.cloud) or not len(target.cloud):
         return Fit(0.0, 0.0, np.zeros((0, 2), dtype=np.int64))
     points = transform_points(T_target_source, source.cloud.points.astype(np.float64))
     off, indices = target.nearest(points, distance)
     met = np.flatnonzero(np.isfinite(off))
+    if by_normals:
+        met = met[_alike(source.cloud.normals[met], target.cloud.normals[indices[met]], T_target_source)]
     rmse = float(np.sqrt(np.mean(off[met] ** 2))) if len(met) else 0.0
     return Fit(len(met) / len(points), rmse, np.column_stack([met, indices[met]]))
 

@@ -6,7 +6,8 @@ from dataclasses import replace
 import numpy as np
 
 from semslam.config import SubmapConfig
-from semslam.geometry.se3 import FloatArray, invert, orthonormalise, rotation_angle, transform_points
+from semslam.geometry.reprojection import retract
+from semslam.geometry.se3 import FloatArray, invert, orthonormalise, rotation_angle, tangent, transform_points
 from semslam.geometry.voxels import voxel_keys
 from semslam.loop.verification.anchors import Anchors, choose_anchors
 from semslam.loop.verification.free_space import BoolArray, sight_of
@@ -60,12 +61,15 @@ class SubmapRegistration:
     The submaps need enough points, a registration that stays near the guess, an overlap that is large from both sides,
     and few points in space that any view of the other submap looked through. Of the keyframes in them, the two that
     share most surface are then registered again with their neighbours alone, and the constraint is between these: a
-    submap is as straight as odometry was while it was seen. This needs to stay near the first registration, an overlap,
-    a small residual and a position that is determined. Nothing in it compares appearance.
+    submap is as straight as odometry was while it was seen. Both registrations count by their covariances, so that
+    along a corridor, which its walls leave open, the submaps decide. This needs to stay near the first registration,
+    an overlap, a small residual and a position that is determined. Only surfaces that face the same way are laid onto
+    one another. Nothing in it compares appearance.
     """
 
     def __init__(self, config: SubmapConfig) -> None:
         self._config = config
+        self._straightness = np.diag(np.repeat((config.sigma_rotation, config.sigma_translation), 3) ** 2)
 
     def verify(
         self, query: Keyframe, match: Keyframe, candidate: LoopCandidate, guess: SubmapGuess
@@ -78,8 +82,9 @@ class SubmapRegistration:
             return LoopRejection(candidate, RejectionReason.NO_CLOUD, smaller, config.min_points)
         T_guess = np.array(guess.T_match_query)
         source, target = Surface(ours), Surface(theirs)
-        T = orthonormalise(refine(source, target, T_guess, config.distances))
-        there, back = measure_fit(source, target, T, config.near), measure_fit(target, source, invert(T), config.near)
+        T = orthonormalise(refine(source, target, T_guess, config.distances, by_normals=True))
+        there = measure_fit(source, target, T, config.near, by_normals=True)
+        back = measure_fit(target, source, invert(T), config.near, by_normals=True)
         overlap = min(there.fitness, back.fitness)
         filled = max(_free_space_share(ours, there, match, T), _free_space_share(theirs, back, query, invert(T)))
         # The less both have seen in common, the surer must be what there is.
@@ -102,12 +107,15 @@ class SubmapRegistration:
         config = self._config
         ours, theirs = (merged_cloud(end, config.voxel) for end in (anchors.query, anchors.match))
         source, target = Surface(ours), Surface(theirs)
-        T = orthonormalise(refine(source, target, anchors.T_match_query, config.distances[1:]))
-        fit = measure_fit(source, target, T, config.fit_distance)
-        there, back = measure_fit(source, target, T, config.near), measure_fit(target, source, invert(T), config.near)
+        T_views = orthonormalise(refine(source, target, anchors.T_match_query, config.distances[1:], by_normals=True))
+        fit = measure_fit(source, target, T_views, config.fit_distance, by_normals=True)
+        found = self._covariance(ours, theirs, T_views, fit)
+        T, covariance = _weighed(anchors.T_match_query, self._straightness, T_views, found)
+        fit = measure_fit(source, target, T, config.fit_distance, by_normals=True)
+        there = measure_fit(source, target, T, config.near, by_normals=True)
+        back = measure_fit(target, source, invert(T), config.near, by_normals=True)
         overlap = min(there.fitness, back.fitness)
-        covariance = self._covariance(ours, theirs, T, fit)
-        sigma = float(np.sqrt(np.linalg.eigvalsh(covariance[3:, 3:])[-1]))
+        sigma = float(np.sqrt(np.linalg.eigvalsh((found + self._straightness)[3:, 3:])[-1]))
         gates = (
             self._stays(anchors.T_match_query, T),
             Gate(overlap >= config.min_view_overlap, RejectionReason.LOW_OVERLAP, overlap, config.min_view_overlap),
@@ -138,13 +146,22 @@ class SubmapRegistration:
         return Gate(stayed, RejectionReason.FAR_FROM_GUESS, moved, config.max_shift)
 
     def _covariance(self, ours: Cloud, theirs: Cloud, T: FloatArray, fit: Fit) -> FloatArray:
-        """Covariance (6, 6) of T: that of point-to-plane ICP, inflated, and what odometry leaves within submaps."""
+        """Covariance (6, 6) of T: that of point-to-plane ICP, inflated."""
         config = self._config
         planes = plane_information(ours, theirs, T, fit.pairs)
         noise = config.inflation * max(fit.rmse, 1e-3) ** 2
-        floor = np.repeat((config.sigma_rotation, config.sigma_translation), 3) ** 2
-        covariance: FloatArray = np.asarray(np.linalg.inv(planes / noise + 1e-6 * np.eye(6))) + np.diag(floor)
+        covariance: FloatArray = np.asarray(np.linalg.inv(planes / noise + 1e-6 * np.eye(6)))
         return (covariance + covariance.T) / 2
+
+
+def _weighed(
+    T: FloatArray, covariance: FloatArray, other: FloatArray, other_covariance: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """The pose between two estimates that their covariances (6, 6) make likeliest."""
+    difference = tangent(invert(T) @ other)
+    gain = covariance @ np.linalg.inv(covariance + other_covariance)
+    both = covariance - gain @ covariance
+    return orthonormalise(retract(T, gain @ difference)), (both + both.T) / 2
 
 
 def _free_space_share(seen: Cloud, fit: Fit, looking: Keyframe, T_looking_seen: FloatArray) -> float:
