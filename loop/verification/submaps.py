@@ -110,7 +110,7 @@ class SubmapRegistration:
         T_views = orthonormalise(refine(source, target, anchors.T_match_query, config.distances[1:], by_normals=True))
         fit = measure_fit(source, target, T_views, config.fit_distance, by_normals=True)
         found = self._covariance(ours, theirs, T_views, fit)
-        T, covariance = _weighed(anchors.T_match_query, self._straightness, T_views, found)
+        T, covariance = _determined(anchors.T_match_query, self._straightness, T_views, found)
         fit = measure_fit(source, target, T, config.fit_distance, by_normals=True)
         there = measure_fit(source, target, T, config.near, by_normals=True)
         back = measure_fit(target, source, invert(T), config.near, by_normals=True)
@@ -154,14 +154,20 @@ class SubmapRegistration:
         return (covariance + covariance.T) / 2
 
 
-def _weighed(
+def _determined(
     T: FloatArray, covariance: FloatArray, other: FloatArray, other_covariance: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """The pose between two estimates that their covariances (6, 6) make likeliest."""
-    difference = tangent(invert(T) @ other)
-    gain = covariance @ np.linalg.inv(covariance + other_covariance)
-    both = covariance - gain @ covariance
-    return orthonormalise(retract(T, gain @ difference)), (both + both.T) / 2
+    """Go from a pose to another one in the directions in which that is the surer one, and their covariance (6, 6).
+
+    Remapping as by Zhang, Kaess and Singh (ICRA 2016): what is hardly determined is no reason to move.
+    """
+    root = np.linalg.cholesky(covariance)
+    whitened = np.linalg.solve(root, np.linalg.solve(root, other_covariance).T)
+    ratios, directions = np.linalg.eigh((whitened + whitened.T) / 2)
+    basis = root @ directions
+    step = np.linalg.solve(basis, tangent(invert(T) @ other))
+    both = (basis * np.minimum(ratios, 1.0)) @ basis.T
+    return orthonormalise(retract(T, basis @ np.where(ratios < 1.0, step, 0.0))), (both + both.T) / 2
 
 
 def _free_space_share(seen: Cloud, fit: Fit, looking: Keyframe, T_looking_seen: FloatArray) -> float:

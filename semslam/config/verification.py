@@ -31,9 +31,9 @@ class SubmapConfig(Section):
     max_sigma: float = setting(0.25, "maximum standard deviation of the relative position", unit="m", gt=0)
     inflation: float = setting(200.0, "factor on ICP's formal variance, for correlated errors of its points", gt=0)
     sigma_rotation: float = setting(
-        0.02, "standard deviation of rotation that odometry leaves within a submap", unit="rad", gt=0
+        0.04, "standard deviation of rotation that odometry leaves within a submap", unit="rad", gt=0
     )
-    sigma_translation: float = setting(0.05, "the same of translation", unit="m", gt=0)
+    sigma_translation: float = setting(0.1, "the same of translation", unit="m", gt=0)
 
 
 class VerificationConfig(Section):

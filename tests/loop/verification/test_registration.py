@@ -5,7 +5,7 @@ import pytest
 
 from semslam.geometry.se3 import FloatArray, make_transform
 from semslam.loop.verification.registration import Surface, measure_fit, refine
-from semslam.loop.verification.submaps import _weighed
+from semslam.loop.verification.submaps import _determined
 from semslam.types import Cloud
 
 PASSES = (0.25, 0.1, 0.06)
@@ -53,7 +53,7 @@ def test_only_what_faces_the_same_way_is_an_inlier(wall_from_both_sides: tuple[S
 def test_the_surer_of_two_poses_counts_more() -> None:
     T, other = np.eye(4), make_transform(np.eye(3), (0.1, 0.1, 0.0))
     sure_across = np.diag([1e-6, 1e-6, 1e-6, 1e-6, 1e2, 1e-6])
-    between, covariance = _weighed(T, 1e-3 * np.eye(6), other, sure_across)
+    between, covariance = _determined(T, 1e-3 * np.eye(6), other, sure_across)
     assert between[0, 3] == pytest.approx(0.1, abs=1e-3)
     assert between[1, 3] == pytest.approx(0.0, abs=1e-3)
     assert np.linalg.eigvalsh(covariance).min() > 0
