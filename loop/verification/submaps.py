@@ -69,7 +69,8 @@ class SubmapRegistration:
 
     def __init__(self, config: SubmapConfig) -> None:
         self._config = config
-        self._straightness = np.diag(np.repeat((config.sigma_rotation, config.sigma_translation), 3) ** 2)
+        self._bent = np.diag(np.repeat((config.bent_rotation, config.bent_translation), 3) ** 2)
+        self._systematic = np.diag(np.repeat((config.sigma_rotation, config.sigma_translation), 3) ** 2)
 
     def verify(
         self, query: Keyframe, match: Keyframe, candidate: LoopCandidate, guess: SubmapGuess
@@ -110,12 +111,12 @@ class SubmapRegistration:
         T_views = orthonormalise(refine(source, target, anchors.T_match_query, config.distances[1:], by_normals=True))
         fit = measure_fit(source, target, T_views, config.fit_distance, by_normals=True)
         found = self._covariance(ours, theirs, T_views, fit)
-        T, covariance = _determined(anchors.T_match_query, self._straightness, T_views, found)
+        T, covariance = _determined(anchors.T_match_query, self._bent, T_views, found)
         fit = measure_fit(source, target, T, config.fit_distance, by_normals=True)
         there = measure_fit(source, target, T, config.near, by_normals=True)
         back = measure_fit(target, source, invert(T), config.near, by_normals=True)
         overlap = min(there.fitness, back.fitness)
-        sigma = float(np.sqrt(np.linalg.eigvalsh((found + self._straightness)[3:, 3:])[-1]))
+        sigma = float(np.sqrt(np.linalg.eigvalsh((found + self._systematic)[3:, 3:])[-1]))
         gates = (
             self._stays(anchors.T_match_query, T),
             Gate(overlap >= config.min_view_overlap, RejectionReason.LOW_OVERLAP, overlap, config.min_view_overlap),
@@ -128,7 +129,7 @@ class SubmapRegistration:
         return LoopConstraint(
             candidate,
             T,
-            covariance,
+            covariance + self._systematic,
             fit.fitness,
             fit.rmse,
             overlap,

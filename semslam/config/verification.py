@@ -30,10 +30,14 @@ class SubmapConfig(Section):
     max_rmse: float = setting(0.04, "maximum root mean square distance of the inliers", unit="m", gt=0)
     max_sigma: float = setting(0.25, "maximum standard deviation of the relative position", unit="m", gt=0)
     inflation: float = setting(200.0, "factor on ICP's formal variance, for correlated errors of its points", gt=0)
-    sigma_rotation: float = setting(
+    bent_rotation: float = setting(
         0.04, "standard deviation of rotation that odometry leaves within a submap", unit="rad", gt=0
     )
-    sigma_translation: float = setting(0.1, "the same of translation", unit="m", gt=0)
+    bent_translation: float = setting(0.1, "the same of translation", unit="m", gt=0)
+    sigma_rotation: float = setting(
+        0.02, "systematic rotation error of two views with their neighbours", unit="rad", ge=0
+    )
+    sigma_translation: float = setting(0.05, "systematic translation error, likewise", unit="m", ge=0)
 
 
 class VerificationConfig(Section):
