@@ -15,7 +15,7 @@ from semslam.loop.memory import LoopMemory, without_content
 from semslam.loop.redundancy import ClosedPlaces
 from semslam.loop.segmentation.build import build_segmenter
 from semslam.loop.segmentation.segmenter import Segmenter
-from semslam.loop.verification.anchors import at_candidate
+from semslam.loop.verification.anchors import at_candidate, choose_anchors
 from semslam.loop.verification.submaps import ends_of
 from semslam.loop.verification.verifier import LoopVerifier, build_verifier
 from semslam.plugins import load
@@ -209,13 +209,23 @@ class LoopSearch:
         return KeyframeView(keyframe, frame.color, frame.depth, labels)
 
     def _verify(self, candidate: LoopCandidate) -> Verification:
-        outcome = self._repeated(candidate, candidate.query, candidate.match) or self._verified(candidate)
+        outcome = self._already_closed(candidate) or self._verified(candidate)
         if isinstance(outcome, LoopConstraint) and outcome.between is not None:
             outcome = self._repeated(candidate, *outcome.between) or outcome
         self._follower.note(outcome)
         if isinstance(outcome, LoopConstraint):
             self._closed.note(outcome)
         return outcome
+
+    def _already_closed(self, candidate: LoopCandidate) -> LoopRejection | None:
+        """The rejection of a candidate that would repeat loops, told before the work of verifying it."""
+        repeated = self._repeated(candidate, candidate.query, candidate.match)
+        if repeated is not None or candidate.guess is None:
+            return repeated
+        query, match = ends_of(candidate, self._keyframes)
+        with self._stopwatch.stage("anchors"):
+            expected = choose_anchors(query, match, np.array(candidate.guess.T_match_query))
+        return self._repeated(candidate, expected.query.id, expected.match.id)
 
     def _repeated(self, candidate: LoopCandidate, query: int, match: int) -> LoopRejection | None:
         """The rejection of a candidate whose loop would repeat others."""

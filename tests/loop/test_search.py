@@ -21,6 +21,7 @@ from semslam.types import (
     LoopConstraint,
     LoopRejection,
     RejectionReason,
+    SubmapGuess,
 )
 
 CAMERA = Intrinsics(64, 48, 60.0, 60.0, 31.5, 23.5)
@@ -135,6 +136,31 @@ def test_no_two_loops_are_between_the_same_keyframes_though_their_candidates_dif
         assert len(verifier.asked) > 1
         rejected = [one for outcomes in found for one in outcomes if isinstance(one, LoopRejection)]
         assert {one.reason for one in rejected} == {RejectionReason.REDUNDANT}
+
+
+def test_submaps_are_not_registered_where_the_views_that_share_their_surface_are_joined_already() -> None:
+    """Keyframes 4 and 12 alone see anything, so that a loop of the submaps around 6 and 14 is between them."""
+
+    class ViewsThenSubmaps(EveryOldOne):
+        def query(self, view: KeyframeView) -> list[LoopCandidate]:
+            guess = SubmapGuess(tuple(map(tuple, np.eye(4).tolist())), (12, 13, 14), (4, 5, 6))
+            found = {
+                12: [LoopCandidate(12, joined, 0.5, "views")],
+                14: [LoopCandidate(14, 6, 0.5, "submaps", guess=guess)],
+            }
+            return found.get(view.keyframe.id, [])
+
+    wall = np.column_stack([np.indices((9, 9)).reshape(2, -1).T * 0.1, np.full(81, 2.0)]).astype(np.float32)
+    seen = Cloud(wall, np.tile(np.float32([0, 0, -1]), (81, 1)))
+    images = np.zeros((48, 64, 3), np.uint8), np.zeros((48, 64), np.float32)
+    for joined, asked in ((4, [12]), (0, [12, 14])):
+        verifier = Standing()
+        search = LoopSearch(ViewsThenSubmaps(), None, verifier, LoopConfig(follow=0, per_place=1))  # type: ignore[arg-type]
+        for number in range(15):
+            view = replace(keyframe(number), cloud=seen) if number in (4, 12) else keyframe(number)
+            outcomes = search.search(view, Frame(number, float(number), *images, CAMERA))
+        assert [candidate.query for candidate in verifier.asked] == asked
+        assert [isinstance(one, LoopRejection) for one in outcomes] == [joined == 4]
 
 
 @pytest.mark.parametrize("per_place", [0, 2])
