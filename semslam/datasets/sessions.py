@@ -13,6 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from semslam.config import DatasetConfig
 from semslam.datasets import open_dataset
+from semslam.datasets.camera_times import CameraTimes, TimedSequence
 from semslam.datasets.dataset import Dataset
 from semslam.errors import DatasetError
 from semslam.types import Frame, Intrinsics, Trajectory
@@ -29,6 +30,7 @@ class Session(BaseModel):
         source: what it is opened by.
         settings: which of its frames are read, and how.
         shift: seconds that are added to its stamps.
+        times: of its camera, where its run estimated them; None = as the sequence states them.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -36,6 +38,16 @@ class Session(BaseModel):
     source: str
     settings: DatasetConfig = DatasetConfig()
     shift: float = Field(0.0, allow_inf_nan=False)
+    times: CameraTimes | None = None
+
+    def open(self) -> Dataset:
+        """Open the sequence.
+
+        Raises:
+            DatasetError: it is not there.
+        """
+        dataset = open_dataset(self.source, self.settings)
+        return dataset if self.times is None else TimedSequence(dataset, self.times)
 
 
 class SessionList(BaseModel):
@@ -111,7 +123,7 @@ class SessionsDataset:
         Raises:
             DatasetError: one is not there, or they overlap in time.
         """
-        return cls([open_dataset(session.source, session.settings) for session in listed.sessions], listed)
+        return cls([session.open() for session in listed.sessions], listed)
 
     @property
     def name(self) -> str:

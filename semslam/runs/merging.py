@@ -76,7 +76,7 @@ def prepare_merge(
     pause = BREAK * max(chosen.loops.min_gap, 1.0)
     shift = math.ceil(first.recording.frames[-1].timestamp + pause - second.recording.frames[0].timestamp)
     sessions = tuple(
-        Session(source=source, settings=one.config.dataset, shift=moved)
+        Session(source=source, settings=one.config.dataset, shift=moved, times=one.recording.times)
         for source, one, moved in zip(sources, saved, (0.0, float(shift)), strict=True)
     )
     dataset = SessionsDataset.of(SessionList(sessions=sessions, one_truth=one_truth or sources[0] == sources[1]))

@@ -88,7 +88,6 @@ def replay(
         DatasetError: it is another sequence.
         PartialRunError: anything went wrong after the first frame, such as a keyframe whose image cannot be read.
     """
-    recording.check(dataset)
-    with closing(Session(dataset, config, verifier, viewer, journal)) as session:
+    with closing(Session(recording.sequence(dataset), config, verifier, viewer, journal)) as session:
         session.drive(session.repeat(recording), progress, stop or Stop())
         return session.result()

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from semslam.config import Config, load_saved_config
+from semslam.datasets.camera_times import CameraTimes, TimedSequence
 from semslam.datasets.dataset import Dataset
 from semslam.errors import ConfigError, DatasetError, ResultsError
 from semslam.files import read_arrays
@@ -43,12 +44,26 @@ class Recording:
         unreadable: the message of each frame that could not be read.
         interrupted: whether the run was stopped before the last frame.
         checksum: of the first frame's images, by which the sequence is known again; 0 = not known.
+        times: of the camera, where the run estimated them; None = as the sequence states them.
     """
 
     frames: tuple[RecordedFrame, ...]
     unreadable: tuple[str, ...]
     interrupted: bool
     checksum: int
+    times: CameraTimes | None = None
+
+    def sequence(self, dataset: Dataset) -> Dataset:
+        """The recorded sequence, its camera with the times that the run used.
+
+        Args:
+            dataset: the sequence as it states itself.
+
+        Raises:
+            DatasetError: it is another one, or its first image cannot be read.
+        """
+        self.check(dataset)
+        return dataset if self.times is None else TimedSequence(dataset, self.times)
 
     def check(self, dataset: Dataset) -> None:
         """Check that a dataset is the recorded sequence.
@@ -135,6 +150,7 @@ def write_recording(directory: Path, recording: Recording, source: str | None = 
         unreadable=np.array(recording.unreadable, dtype=np.str_),
         interrupted=np.array(recording.interrupted),
         checksum=np.array(recording.checksum, dtype=np.uint32),
+        times=_times_array(recording.times),
         index=np.array([frame.index for frame in recording.frames], dtype=np.int64),
         timestamp=np.array([frame.timestamp for frame in recording.frames]),
         T_prev_cur=np.array([motion.T_prev_cur for motion in motions]).reshape(-1, 4, 4),
@@ -193,6 +209,7 @@ def read_recording(directory: Path) -> Recording:
             unreadable=tuple(str(text) for text in arrays["unreadable"]),
             interrupted=bool(arrays["interrupted"]),
             checksum=int(arrays["checksum"]),
+            times=_times(arrays["times"]),
         )
     except KeyError as error:
         raise ResultsError(f"The saved front end in {directory} was written by another version.") from error
@@ -229,6 +246,21 @@ def _observations(arrays: Arrays) -> list[Observations | None]:
         None if count < 0 else Observations(*(column[end - count : end] for column in columns))
         for count, end in zip(counts.tolist(), ends.tolist(), strict=True)
     ]
+
+
+def _times_array(times: CameraTimes | None) -> npt.NDArray[np.float64]:
+    """Nothing where the sequence's own count; a read-out of depth that is colour's is NaN."""
+    return np.array([] if times is None else [times.readout, times.delay, times.depth_readout], dtype=np.float64)
+
+
+def _times(array: npt.NDArray[Any]) -> CameraTimes | None:
+    """The reverse; a ValueError says that they are no times."""
+    if not len(array):
+        return None
+    readout, delay, depth_readout = array.tolist()
+    if not np.isfinite((readout, delay)).all():
+        raise ValueError("no times")
+    return CameraTimes(readout, delay, None if np.isnan(depth_readout) else depth_readout)
 
 
 def _joined(parts: Sequence[npt.NDArray[Any]], dtype: Any, shape: tuple[int, ...]) -> npt.NDArray[Any]:

@@ -89,8 +89,7 @@ def find_images(directory: Path, sequence: str | None = None) -> tuple[Dataset |
     if source is None:
         return None, f"{directory} does not say where they are."
     try:
-        dataset = open_dataset(source, config=saved.config.dataset)
-        saved.recording.check(dataset)
+        dataset = saved.recording.sequence(open_dataset(source, config=saved.config.dataset))
     except DatasetError as error:
         if sequence is not None:
             raise
@@ -113,8 +112,7 @@ def open_saved(directory: Path, sequence: str | None = None) -> SavedViews:
     source = sequence or saved.source
     if source is None:
         raise ResultsError(f"{directory} does not say where its images are; name the sequence with --sequence.")
-    dataset = open_dataset(source, config=run.config.dataset)
-    saved.recording.check(dataset)
+    dataset = saved.recording.sequence(open_dataset(source, config=run.config.dataset))
     # Trajectory files keep nine decimals of a stamp.
     frames = {round(frame.timestamp, 9): frame.index for frame in saved.recording.frames}
     ids = {round(stamp, 9): id for id, stamp in run.keyframe_stamps.items()}

@@ -1,12 +1,11 @@
 """The timing of a camera that states none, from the first seconds of its sequence, before they are tracked."""
 
 from collections.abc import Iterator
-from dataclasses import replace
 
 from semslam.config import Config
 from semslam.datasets.camera_file import CameraSetup
+from semslam.datasets.camera_times import CameraTimes, TimedSequence
 from semslam.datasets.dataset import Dataset
-from semslam.datasets.selection import ChosenFrames
 from semslam.errors import FOREIGN, DatasetError
 from semslam.frontend.feature_map.odometry import FeatureMapOdometry
 from semslam.frontend.prediction import check_frame
@@ -14,13 +13,13 @@ from semslam.frontend.sensor.calibration import calibrate
 from semslam.frontend.sensor.estimate import Estimate, SensorEstimate
 from semslam.plugins import load
 from semslam.runs.metrics import SensorMetrics, TimingMetrics
-from semslam.types import Frame, Intrinsics
+from semslam.types import Frame
 
 FIRST_SECONDS = 8.0
 """How much of a sequence is looked at."""
 
 
-class CalibratedSequence(ChosenFrames):
+class CalibratedSequence(TimedSequence):
     """A sequence whose camera has the times that its first seconds determine; the read-out is none where they do not.
 
     Args:
@@ -28,16 +27,8 @@ class CalibratedSequence(ChosenFrames):
     """
 
     def __init__(self, dataset: Dataset) -> None:
-        super().__init__(dataset, range(len(dataset)))
         self._estimate = calibrate(_first(dataset))
-        found = self._estimate.applied(CameraSetup(dataset.intrinsics)).intrinsics
-        readout = 0.0 if found.readout is None else found.readout
-        self._camera = replace(found, readout=readout)
-
-    @property
-    def intrinsics(self) -> Intrinsics:
-        """The camera with its times."""
-        return self._camera
+        super().__init__(dataset, CameraTimes.of(self._estimate.applied(CameraSetup(dataset.intrinsics)).intrinsics))
 
     @property
     def metrics(self) -> SensorMetrics:
@@ -47,22 +38,13 @@ class CalibratedSequence(ChosenFrames):
             readout=_timing(estimate.readout),
             delay=_timing(estimate.delay),
             depth_readout=_timing(estimate.depth_readout),
-            used_readout_ms=1000 * (self._camera.readout or 0.0),
+            used_readout_ms=1000 * self.times.readout,
         )
 
     @property
     def notes(self) -> list[str]:
         """Notes of the sequence, and what was found."""
         return [*super().notes, _sentence(self._estimate)]
-
-    def frame(self, index: int) -> Frame:
-        """Read a frame.
-
-        Raises:
-            DatasetError: an image is not readable.
-            IndexError: there is no such frame.
-        """
-        return replace(super().frame(index), intrinsics=self._camera)
 
 
 def needs_timing(dataset: Dataset, config: Config) -> bool:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from functools import lru_cache, partial
 
 from semslam.config import Config
+from semslam.datasets.camera_times import TimedSequence
 from semslam.datasets.dataset import Dataset
 from semslam.datasets.feed import Feed
 from semslam.datasets.plausibility import check_plausibility
@@ -265,6 +266,7 @@ class Session:
                 tuple(self._unreadable),
                 self._interrupted,
                 self._checksum,
+                self._dataset.times if isinstance(self._dataset, TimedSequence) else None,
             ),
             notes=(
                 *self._doubts(slam, scores),

@@ -7,6 +7,7 @@ import pytest
 
 from semslam.config import DatasetConfig
 from semslam.datasets import open_dataset
+from semslam.datasets.camera_times import CameraTimes
 from semslam.datasets.sessions import SESSIONS, Session, SessionList, SessionsDataset
 from semslam.errors import ConfigError, DatasetError
 
@@ -28,6 +29,14 @@ def test_frames_follow_one_another_and_keep_their_numbers() -> None:
     assert np.array_equal(dataset.frame(4).color, whole.frame(2).color)
     assert dataset.place(4) == (1, 1)
     assert dataset.own_stamp(4) == pytest.approx(0.2)
+
+
+def test_a_session_has_the_camera_times_that_its_run_estimated(tmp_path: Path) -> None:
+    times = CameraTimes(0.02, 0.001, None)
+    first, second = listed(0.0, 7.0).sessions
+    SessionList(sessions=(first.model_copy(update={"times": times}), second)).write(tmp_path / SESSIONS)
+    dataset = open_dataset(tmp_path / SESSIONS)
+    assert [CameraTimes.of(dataset.frame(index).intrinsics) == times for index in (0, 5)] == [True, False]
 
 
 def test_ground_truth_is_joined_only_where_it_is_in_one_world() -> None:

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from semslam.config import Config
 from semslam.datasets import open_dataset
+from semslam.datasets.camera_times import CameraTimes
 from semslam.errors import ConfigError, DatasetError, ResultsError
 from semslam.geometry.se3 import exp_so3, make_transform
 from semslam.runs.manifest import seal
@@ -29,6 +30,7 @@ from tests.conftest import Call, WallDataset
 
 ALONE = Config(detector="none")
 SCENE = "synthetic:room?frames=8&width=160"
+SECONDS = st.floats(0, 0.1)
 SAME = ("trajectory.txt", "odometry.txt", "keyframes.txt", "loops.jsonl", "graph.g2o", "frontend.npz", "config.yaml")
 
 
@@ -179,13 +181,15 @@ def test_a_recording_reads_back(
     (directory / "config.yaml").write_text(ALONE.dump())
     rng = np.random.default_rng(data.draw(st.integers(0, 2**32)))
     frames = tuple(_frame(index, data.draw(st.none() | st.integers(0, 4)), rng) for index in range(count))
-    recording = Recording(frames, tuple(unreadable), interrupted=True, checksum=2**32 - 1)
+    times = data.draw(st.none() | st.builds(CameraTimes, SECONDS, SECONDS, st.none() | SECONDS))
+    recording = Recording(frames, tuple(unreadable), interrupted=True, checksum=2**32 - 1, times=times)
     write_recording(directory, recording, str(directory))
     seal(directory, "{}")
     front_end = read_front_end(directory)
     read = front_end.recording
     assert front_end.source == str(directory)
     assert (read.unreadable, read.interrupted, read.checksum) == (recording.unreadable, True, 2**32 - 1)
+    assert read.times == times
     for before, after in zip(frames, read.frames, strict=True):
         assert (before.index, before.timestamp) == (after.index, after.timestamp)
         one, other = before.motion, after.motion
@@ -198,11 +202,11 @@ def test_a_recording_reads_back(
                 np.testing.assert_array_equal(getattr(one.observations, field), getattr(other.observations, field))
 
 
-@pytest.mark.parametrize("name", ["T_prev_cur", "covariance", "timestamp", "landmarks", "status", "checksum"])
+@pytest.mark.parametrize("name", ["T_prev_cur", "covariance", "timestamp", "landmarks", "status", "checksum", "times"])
 def test_a_damaged_recording_is_named(tmp_path: Path, name: str) -> None:
     rng = np.random.default_rng(0)
     frames = tuple(_frame(index, 3, rng) for index in range(3))
-    write_recording(tmp_path, Recording(frames, (), interrupted=False, checksum=1))
+    write_recording(tmp_path, Recording(frames, (), False, checksum=1, times=CameraTimes(0.026, 0.0, None)))
     with np.load(tmp_path / "frontend.npz") as file:
         arrays = dict(file)
     damaged = arrays[name].astype(np.float64) * np.nan if name != "status" else np.array(["ok", "fine", "ok"])

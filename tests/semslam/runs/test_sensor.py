@@ -1,5 +1,8 @@
 """A camera that states no read-out gets the one that the first seconds determine, or a global shutter."""
 
+from pathlib import Path
+
+import numpy as np
 import pytest
 
 from semslam.config import Config
@@ -7,7 +10,9 @@ from semslam.datasets import open_dataset
 from semslam.datasets.synthetic import Request, SyntheticDataset
 from semslam.errors import DatasetError
 from semslam.frontend.feature_map.settings import FeatureMapConfig
-from semslam.runs.pipeline import run
+from semslam.runs.pipeline import replay, run
+from semslam.runs.recording import read_front_end
+from semslam.runs.results import write_run
 from semslam.runs.sensor import CalibratedSequence, needs_timing
 from semslam.types import Frame
 
@@ -47,6 +52,22 @@ def test_a_known_camera_is_not_estimated() -> None:
     assert (
         run(room(frames=3), Config(detector="none", feature_map=FeatureMapConfig(readout=0.0))).metrics.sensor is None
     )
+
+
+def test_a_replay_has_the_times_that_the_run_found(tmp_path: Path) -> None:
+    """Without them keyframes' clouds lie elsewhere, and loops with them."""
+    dataset = room(readout=0.026, sway=2, frames=41)
+    first = run(dataset, QUIET)
+    write_run(first, dataset, tmp_path / "first", plots=False)
+    saved = read_front_end(tmp_path / "first").recording
+    assert saved.times is not None
+    assert 1000 * saved.times.readout == first.metrics.sensor.used_readout_ms
+    again = replay(dataset, saved, QUIET)
+    assert again.recording.times == saved.times
+    for before, after in zip(first.slam.keyframes, again.slam.keyframes, strict=True):
+        assert before.intrinsics == after.intrinsics
+        np.testing.assert_array_equal(before.cloud.points, after.cloud.points)
+        np.testing.assert_array_equal(before.features.points, after.features.points)
 
 
 class Broken(SyntheticDataset):
