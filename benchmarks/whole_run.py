@@ -20,6 +20,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from semslam.config import Config
 from semslam.datasets import open_dataset
 from semslam.datasets.tum_format import read_trajectory
 from semslam.eval.trajectory import score_trajectory
@@ -110,7 +111,7 @@ def main() -> None:
     parser.add_argument("--peer", nargs=2, metavar=("PYTHON", "SCRIPT"))
     parser.add_argument("--depth-scale", type=float, default=5000.0, help="of the sequences, for the peer")
     parser.add_argument("--workers", default="none,thread,process")
-    parser.add_argument("--detector", default="fused")
+    parser.add_argument("--detector", default=Config().detector)
     parser.add_argument("--repeats", type=int, default=3)
     args = parser.parse_args()
     print("| sequence | run | wall s | CPU s | peak MB | ATE cm | live ATE cm | loops accepted / false |")

@@ -61,7 +61,7 @@ def main() -> None:
     parser.add_argument("sequence")
     parser.add_argument("--frames", type=int, default=300)
     parser.add_argument("--repeats", type=int, default=3)
-    parser.add_argument("--detector", default="fused")
+    parser.add_argument("--detector", default=Config().detector)
     arguments = parser.parse_args()
     config = Config().with_changes(detector=arguments.detector, dataset={"max_frames": arguments.frames})
     dataset = open_dataset(arguments.sequence, config.dataset)

@@ -6,6 +6,7 @@ from itertools import chain
 
 import numpy as np
 
+from semslam.config import Config
 from semslam.errors import ResultsError
 from semslam.frontend.keyframes import EveryNth, KeyframeBuilder
 from semslam.geometry.se3 import FloatArray, Transform, interpolate, invert, rotation_angle
@@ -18,15 +19,14 @@ NEAR_M, NEAR_RAD = 0.25, 0.1
 """How far two loops between the runs may disagree and still say the same."""
 MIN_LOOPS = 5
 """Loops that must agree."""
-DETECTOR = "fused"
-"""Proposes pairs where the first run had no detector."""
 
 
 def align_runs(first: SavedViews, second: SavedViews, progress: Progress = silent) -> FloatArray:
     """Estimate the transform from the second run's world to the first one's, by loops between them.
 
-    The first run's detector proposes pairs of keyframes across the runs, and the usual verification decides. Each
-    verified loop says where the second world lies. The largest set of loops that say the same as one of them wins.
+    The first run's detector, or the default one where it had none, proposes pairs of keyframes across the runs, and
+    the usual verification decides. Each verified loop says where the second world lies. The largest set of loops that
+    say the same as one of them wins.
 
     Args:
         first: a run.
@@ -43,7 +43,7 @@ def align_runs(first: SavedViews, second: SavedViews, progress: Progress = silen
     """
     config = first.run.config
     if config.detector == NoLoops.name:
-        config = config.with_changes(detector=DETECTOR)
+        config = config.with_changes(detector=Config().detector)
     builder = KeyframeBuilder(config, EveryNth(1))
     search = LoopSearch.from_config(config)
     placed = (*first.keyframes, *second.keyframes)

@@ -23,8 +23,6 @@ from semslam.runs.results import fill
 from semslam.system.result import SlamResult
 from semslam.types import LoopConstraint, Motion, RejectionReason, TrackingStatus, Trajectory
 
-DETECTOR = "fused"
-"""Proposes loops where the first run had no detector."""
 JOINING = 3
 """Loops that must agree before they join the sessions, of which odometry can contradict none."""
 BREAK = 2.0
@@ -90,7 +88,7 @@ def merge_settings(config: Config) -> Config:
 
     The sessions are joined by ``JOINING`` loops that agree, or more where the run asked for more.
     """
-    detector = DETECTOR if config.detector == NoLoops.name else config.detector
+    detector = Config().detector if config.detector == NoLoops.name else config.detector
     joining = {"joining_loops": max(config.backend.joining_loops, JOINING)}
     return config.with_changes(dataset=DatasetConfig(), detector=detector, backend=joining)
 

@@ -80,7 +80,7 @@ class Suite(_Part):
     name: str = "bench"
     sequences: tuple[Annotated[SuiteSequence, BeforeValidator(_sequence)], ...] = Field(min_length=1)
     odometries: tuple[str, ...] = Field((Config().odometry,), min_length=1)
-    detectors: tuple[str, ...] = Field(("none", "semantic", "fused"), min_length=1)
+    detectors: tuple[str, ...] = Field(("none", "semantic", Config().detector), min_length=1)
     settings: dict[str, dict[str, Any]] = Field({"default": {}}, min_length=1)
     seeds: tuple[Annotated[int, Field(ge=0)], ...] = Field((0,), min_length=1)
     starts: tuple[Annotated[int, Field(ge=0)], ...] = Field((0,), min_length=1)
