@@ -209,7 +209,7 @@ def read_recording(directory: Path) -> Recording:
             unreadable=tuple(str(text) for text in arrays["unreadable"]),
             interrupted=bool(arrays["interrupted"]),
             checksum=int(arrays["checksum"]),
-            times=_times(arrays["times"]),
+            times=_times(arrays.get("times", ())),  # folders of before have none
         )
     except KeyError as error:
         raise ResultsError(f"The saved front end in {directory} was written by another version.") from error
@@ -253,11 +253,12 @@ def _times_array(times: CameraTimes | None) -> npt.NDArray[np.float64]:
     return np.array([] if times is None else [times.readout, times.delay, times.depth_readout], dtype=np.float64)
 
 
-def _times(array: npt.NDArray[Any]) -> CameraTimes | None:
+def _times(array: npt.ArrayLike) -> CameraTimes | None:
     """The reverse; a ValueError says that they are no times."""
-    if not len(array):
+    times = np.asarray(array, dtype=np.float64)
+    if not len(times):
         return None
-    readout, delay, depth_readout = array.tolist()
+    readout, delay, depth_readout = times.tolist()
     if not np.isfinite((readout, delay)).all():
         raise ValueError("no times")
     return CameraTimes(readout, delay, None if np.isnan(depth_readout) else depth_readout)

@@ -219,6 +219,15 @@ def test_a_damaged_recording_is_named(tmp_path: Path, name: str) -> None:
         read_recording(tmp_path)
 
 
+def test_a_recording_from_before_cameras_times_were_kept_is_read(tmp_path: Path) -> None:
+    frames = tuple(_frame(index, 3, np.random.default_rng(0)) for index in range(3))
+    write_recording(tmp_path, Recording(frames, (), False, checksum=1, times=CameraTimes(0.026, 0.0, None)))
+    with np.load(tmp_path / "frontend.npz") as file:
+        arrays = {name: array for name, array in file.items() if name != "times"}
+    np.savez(tmp_path / "frontend.npz", **arrays)
+    assert read_recording(tmp_path).times is None
+
+
 def test_a_recording_of_another_version_is_named(tmp_path: Path) -> None:
     frames = tuple(_frame(index, 3, np.random.default_rng(0)) for index in range(3))
     write_recording(tmp_path, Recording(frames, (), interrupted=False, checksum=1))
