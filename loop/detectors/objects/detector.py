@@ -141,7 +141,7 @@ class ObjectsDetector(RememberingDetector[Submap]):
         ]
 
     def _shortlist(self, view: KeyframeView, submap: Submap) -> list[int]:
-        """Positions of earlier submaps, without a keyframe in common, that hold the same things.
+        """Positions of submaps that ended ``loops.min_gap`` before this one begins and hold the same things.
 
         What both hold of each group at each height, as a share of what the poorer one holds; groups that few submaps
         hold weigh more (inverse document frequency).
@@ -151,7 +151,7 @@ class ObjectsDetector(RememberingDetector[Submap]):
         common = np.minimum(contents, submap.content) @ rarity
         alike = common / np.maximum(np.minimum(contents @ rarity, submap.content @ rarity), 1e-9)
         stamps = self._timeline.stamps
-        old = (view.keyframe.timestamp - stamps >= self._loops.min_gap) & (stamps < submap.start)
+        old = submap.start - stamps >= self._loops.min_gap
         chosen: list[int] = []
         for at in np.argsort(-np.where(old, alike, -1.0), kind="stable").tolist():
             if not old[at] or len(chosen) == self._config.shortlist:
