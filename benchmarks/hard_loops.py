@@ -9,8 +9,8 @@ above 120. Printed for each detector and kind:
 
 - ranked: share of revisits with a proposed candidate of their place that scores above every proposed candidate of a
   different place: recall without a false proposal;
-- closed: share of revisits with a verified loop whose pose is within 0.20 m and 10 degrees; ``off`` counts those of the
-  ``verified`` loops that miss this, ``false`` those by over 0.5 m or 20 degrees.
+- closed: share of revisits with a verified loop over at least 15 s whose pose is within 0.20 m and 10 degrees; ``off``
+  counts those of all ``verified`` loops that miss this, ``false`` those by over 0.5 m or 20 degrees.
 
 With ``--crowd N`` the scene's keyframes are first entered repeatedly until the database holds N, and only what a
 detector keeps of each and the processor time of a query, description included and segmentation not, are printed.
@@ -27,7 +27,7 @@ from semslam import plugins
 from semslam.config import Config, parse_overrides
 from semslam.datasets import open_dataset
 from semslam.datasets.synthetic import SyntheticDataset
-from semslam.eval.loops.places import PlaceTruth, Revisit, find_places
+from semslam.eval.loops.places import MIN_GAP, PlaceTruth, Revisit, find_places
 from semslam.eval.loops.truth import ANGLE_TOLERANCE, POSE_TOLERANCE
 from semslam.eval.trajectory import poses_at
 from semslam.geometry.se3 import invert, rotation_angle
@@ -61,7 +61,7 @@ class Answers:
     Attributes:
         ranked: (N,) score of each query's best candidate of its place, 0 = none.
         bar: the highest score of a candidate of a different place.
-        closed: (N,) whether a verified loop has the right pose.
+        closed: (N,) whether a verified loop of each query to an earlier visit has the right pose.
         verified, off, false: verified loops, those whose pose is off, those by much.
     """
 
@@ -133,7 +133,8 @@ def ask(name: str, scene: Scene, config: Config) -> Answers:
                 right = metres <= POSE_TOLERANCE and degrees <= ANGLE_TOLERANCE
                 verified, off = verified + 1, off + (not right)
                 false += metres > FALSE_METRES or degrees > FALSE_DEGREES
-                closed[query] = max(closed[query], float(right))
+                earlier = keyframes[outcome.query].timestamp - keyframes[outcome.match].timestamp >= MIN_GAP
+                closed[query] = max(closed[query], float(right and earlier))
         detector.add(view)
     return Answers(ranked, bar, closed, verified, off, false)
 
