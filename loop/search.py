@@ -218,7 +218,7 @@ class LoopSearch:
         return outcome
 
     def _already_closed(self, candidate: LoopCandidate) -> LoopRejection | None:
-        """The rejection of a candidate that would repeat loops, told before the work of verifying it."""
+        """The rejection of a candidate whose loop would repeat others, as far as that is known before verifying it."""
         repeated = self._repeated(candidate, candidate.query, candidate.match)
         if repeated is not None or candidate.guess is None:
             return repeated
