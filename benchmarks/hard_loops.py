@@ -27,7 +27,7 @@ from semslam import plugins
 from semslam.config import Config, parse_overrides
 from semslam.datasets import open_dataset
 from semslam.datasets.synthetic import SyntheticDataset
-from semslam.eval.loops.places import MIN_GAP, PlaceTruth, Revisit, find_places
+from semslam.eval.loops.places import PlaceTruth, Revisit, find_places, is_revisit
 from semslam.eval.loops.truth import ANGLE_TOLERANCE, POSE_TOLERANCE
 from semslam.eval.trajectory import poses_at
 from semslam.geometry.se3 import invert, rotation_angle
@@ -133,8 +133,8 @@ def ask(name: str, scene: Scene, config: Config) -> Answers:
                 right = metres <= POSE_TOLERANCE and degrees <= ANGLE_TOLERANCE
                 verified, off = verified + 1, off + (not right)
                 false += metres > FALSE_METRES or degrees > FALSE_DEGREES
-                earlier = keyframes[outcome.query].timestamp - keyframes[outcome.match].timestamp >= MIN_GAP
-                closed[query] = max(closed[query], float(right and earlier))
+                gap = keyframes[outcome.query].timestamp - keyframes[outcome.match].timestamp
+                closed[query] = max(closed[query], float(right and is_revisit(gap)))
         detector.add(view)
     return Answers(ranked, bar, closed, verified, off, false)
 

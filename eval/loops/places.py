@@ -58,6 +58,15 @@ class PlaceTruth:
         return np.flatnonzero([found is kind for found in self.kinds])
 
 
+def is_revisit(gaps: npt.ArrayLike) -> BoolArray:
+    """Whether ``MIN_GAP`` lies between two keyframes.
+
+    Args:
+        gaps: seconds from the earlier to the later keyframe, of any shape.
+    """
+    return np.asarray(gaps, dtype=np.float64) >= MIN_GAP - 1e-9
+
+
 def find_places(timestamps: npt.ArrayLike, clouds: Sequence[Cloud], poses: FloatArray, rooms: IntArray) -> PlaceTruth:
     """Compare the surroundings of all pairs of keyframes.
 
@@ -70,7 +79,7 @@ def find_places(timestamps: npt.ArrayLike, clouds: Sequence[Cloud], poses: Float
     """
     stamps = np.asarray(timestamps, dtype=np.float64)
     common = _common_surface(stamps, clouds, poses)
-    earlier = stamps[:, None] - stamps[None, :] >= MIN_GAP - 1e-9
+    earlier = is_revisit(stamps[:, None] - stamps[None, :])
     one_room = (rooms[:, None] == rooms) | (rooms[:, None] < 0) | (rooms < 0)
     same = earlier & one_room & (common >= COMMON)
     angles = np.degrees(np.arccos(np.clip(poses[:, :3, 2] @ poses[:, :3, 2].T, -1.0, 1.0)))

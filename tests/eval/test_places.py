@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from semslam.eval.loops.places import Revisit, find_places
+from semslam.eval.loops.places import Revisit, find_places, is_revisit
 from semslam.geometry.se3 import FloatArray, exp_so3, make_transform
 from semslam.types import Cloud
 
@@ -55,3 +55,7 @@ def test_the_nearest_camera_decides() -> None:
     poses = np.stack([looking(0, 2.0), looking(180, 0.1), looking(0)])
     truth = find_places([0, 1, 40], [wall(T, 0.0) for T in poses], poses, np.zeros(3, dtype=np.int64))
     assert truth.kinds[2] is Revisit.OPPOSITE
+
+
+def test_a_revisit_is_at_least_fifteen_seconds_later_as_far_as_sums_of_frame_times_can_tell() -> None:
+    assert is_revisit([14.9, 15.0, 3.0 * 5.1 - 0.3 - 1e-12, 60.0]).tolist() == [False, True, True, True]
