@@ -107,8 +107,8 @@ class LoopSearch:
             labels: its segmentation, where there is one already.
 
         Returns:
-            What became of each candidate, in order; those that would repeat loops of neighbouring keyframes are not
-            verified.
+            What became of each candidate, those of views before those of submaps; those that would repeat loops of
+            neighbouring keyframes are not verified.
         """
         view = self._view(keyframe, frame, labels)
         self._labels = view.labels
@@ -117,7 +117,7 @@ class LoopSearch:
             self._detector.add(view)
         self._follower.add(keyframe, self._keyframes[-1] if self._keyframes else None)
         self._keyframes.append(keyframe)
-        outcomes = [self._verify(candidate) for candidate in candidates]
+        outcomes = [self._verify(candidate) for candidate in _views_first(candidates)]
         while (further := self._follower.propose(self._keyframes)) is not None:
             outcomes.append(self._verify(further))
         if self._is_known(outcomes):
@@ -240,3 +240,8 @@ class LoopSearch:
         with self._stopwatch.stage("verify"):
             outcome = self._verifier.verify(query, match, predicted)
         return replace(outcome, candidate=candidate)
+
+
+def _views_first(candidates: Sequence[LoopCandidate]) -> list[LoopCandidate]:
+    """Submaps are not registered where views have joined the places already, which costs less."""
+    return sorted(candidates, key=lambda candidate: candidate.guess is not None)

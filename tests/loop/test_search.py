@@ -163,6 +163,22 @@ def test_submaps_are_not_registered_where_the_views_that_share_their_surface_are
         assert [isinstance(one, LoopRejection) for one in outcomes] == [joined == 4]
 
 
+def test_views_are_verified_before_submaps_whatever_their_scores_are() -> None:
+    class SureOfSubmaps(EveryOldOne):
+        def query(self, view: KeyframeView) -> list[LoopCandidate]:
+            guess = SubmapGuess(tuple(map(tuple, np.eye(4).tolist())), (FIRST,), (5,))
+            submap = LoopCandidate(FIRST, 5, 0.9, "submaps", guess=guess)
+            views = [LoopCandidate(FIRST, match, score, "views") for match, score in ((8, 0.6), (2, 0.5))]
+            return [submap, *views] if view.keyframe.id == FIRST else []
+
+    verifier = Standing()
+    search = LoopSearch(SureOfSubmaps(), None, verifier, LoopConfig(follow=0, per_place=0))  # type: ignore[arg-type]
+    images = np.zeros((48, 64, 3), np.uint8), np.zeros((48, 64), np.float32)
+    for number in range(FIRST + 1):
+        search.search(keyframe(number), Frame(number, float(number), *images, CAMERA))
+    assert [candidate.match for candidate in verifier.asked] == [8, 2, 5]
+
+
 @pytest.mark.parametrize("per_place", [0, 2])
 def test_beyond_a_number_of_keyframes_those_that_say_nothing_new_are_not_kept(per_place: int) -> None:
     detector, verifier = Forgetful(), Standing()
