@@ -228,5 +228,5 @@ def _matrix(found: list[tuple[int, int, float]], count: int) -> FloatArray:
     scores: npt.NDArray[np.float64] = np.zeros((count, count))
     if found:
         rows, columns, values = zip(*found, strict=True)
-        scores[list(rows), list(columns)] = values
+        np.maximum.at(scores, (list(rows), list(columns)), values)
     return scores

@@ -50,13 +50,13 @@ class DetectorContract:
         assert detector.query(place(0, 0)) == []
 
     def test_candidates_are_ranked_scored_and_named(self) -> None:
-        """Best first, scores within 0..1, each keyframe once, at most ``loops.max_candidates``."""
+        """Best first, scores within 0..1, each keyframe once by its view and once by its submap."""
         found = self.filled().query(place(50, 2))
         scores = [candidate.score for candidate in found]
         assert scores == sorted(scores, reverse=True)
         assert all(0 <= score <= 1 for score in scores)
         assert all(candidate.detector == self.implementation.name and candidate.query == 50 for candidate in found)
-        assert len({candidate.match for candidate in found}) == len(found) <= self.config.loops.max_candidates
+        assert len({(candidate.match, candidate.guess is None) for candidate in found}) == len(found)
         assert {candidate.match for candidate in found} <= set(range(PLACES))
 
     def test_the_same_view_is_found_again(self) -> None:
@@ -81,9 +81,12 @@ class DetectorContract:
             assert all(timestamp - 10.0 * candidate.match >= self.config.loops.min_gap for candidate in found)
 
     def test_max_candidates_is_kept(self) -> None:
-        """``loops.max_candidates`` limits what one query returns."""
-        one = self.config.with_changes(loops={"max_candidates": 1})
-        assert len(self.filled(one).query(place(50, 2))) <= 1
+        """``loops.max_candidates`` limits how many views and how many submaps one query returns."""
+        for number in (1, 2):
+            config = self.config.with_changes(loops={"max_candidates": number})
+            found = self.filled(config).query(place(50, 2))
+            assert sum(candidate.guess is None for candidate in found) <= number
+            assert sum(candidate.guess is not None for candidate in found) <= number
 
     def remembering(self) -> Remembering:
         """A filled detector that can forget; the test is skipped where it states that it cannot."""

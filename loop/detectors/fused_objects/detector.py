@@ -21,9 +21,9 @@ VIEWS, SUBMAPS = "views/", "submaps/"
 class FusedObjectsDetector:
     """The candidates of `fused` and those of `objects`, by the probability of either.
 
-    What `objects` states of a match is joined to the probability that its pose is right, learned on rendered houses.
-    A keyframe that views and submaps both propose has the probability that one of them is right, and the submaps'
-    guess of its pose. A share of the candidates is the best by submaps.
+    The score of a submap is the probability that its pose is right by what `objects` states of the match, learned on
+    rendered houses. Submaps are proposed beside the views and take no view's place; a keyframe that both propose is
+    proposed twice, with and without a guess of its pose.
     """
 
     name = "fused-objects"
@@ -40,7 +40,7 @@ class FusedObjectsDetector:
     ) -> None:
         self._views, self._submaps, self._belief = views, submaps, belief
         self._max_candidates = loops.max_candidates
-        self._spare = min(int(config.submap_share * loops.max_candidates), loops.max_candidates - 1)
+        self._beside = int(config.submap_share * loops.max_candidates)
         self._min_probability = config.min_probability if loops.min_score is None else loops.min_score
 
     @classmethod
@@ -61,15 +61,11 @@ class FusedObjectsDetector:
         Raises:
             ConfigError: the view holds no labels.
         """
-        seen = {candidate.match: candidate for candidate in self._views.query(view)}
-        matched = self._believed(self._submaps.query(view))
-        both = {match: _either(candidate, seen[match]) for match, candidate in matched.items() if match in seen}
-        matched |= both
-        by_submap = sorted(matched.values(), key=_rank)[: self._spare]
-        chosen = {candidate.match for candidate in by_submap}
-        others = [each for each in sorted((seen | matched).values(), key=_rank) if each.match not in chosen]
-        candidates = [*by_submap, *others[: self._max_candidates - len(by_submap)]]
-        return [replace(candidate, detector=self.name) for candidate in sorted(candidates, key=_rank)]
+        seen = self._views.query(view)
+        matched = sorted(self._believed(self._submaps.query(view)), key=_rank)
+        room = max(self._beside, self._max_candidates - len(seen))
+        candidates = sorted([*seen, *matched[:room]], key=_rank)
+        return [replace(candidate, detector=self.name) for candidate in candidates]
 
     def add(self, view: KeyframeView) -> None:
         """Remember a keyframe for later queries."""
@@ -93,20 +89,14 @@ class FusedObjectsDetector:
         self._views.recall([_part(look, VIEWS) for look in looks])
         self._submaps.recall([_part(look, SUBMAPS) for look in looks])
 
-    def _believed(self, candidates: Sequence[LoopCandidate]) -> dict[int, LoopCandidate]:
-        """The candidates of submaps that are probable enough, by their match, with the probability as their score."""
+    def _believed(self, candidates: Sequence[LoopCandidate]) -> list[LoopCandidate]:
+        """The candidates of submaps that are probable enough, with the probability as their score."""
         probabilities = self._belief.probabilities(candidates).tolist()
-        return {
-            candidate.match: replace(candidate, score=probability)
+        return [
+            replace(candidate, score=probability)
             for candidate, probability in zip(candidates, probabilities, strict=True)
             if probability >= self._min_probability
-        }
-
-
-def _either(by_submap: LoopCandidate, by_view: LoopCandidate) -> LoopCandidate:
-    """A keyframe that views and submaps propose, each with a probability of its own."""
-    evidence = replace(by_submap.evidence, figures=by_view.evidence.figures | by_submap.evidence.figures)
-    return replace(by_submap, score=1.0 - (1.0 - by_submap.score) * (1.0 - by_view.score), evidence=evidence)
+        ]
 
 
 def _named(part: str, arrays: Arrays) -> dict[str, npt.NDArray[Any]]:
@@ -119,5 +109,5 @@ def _part(look: Look, part: str) -> Look:
     return replace(look, arrays=own)
 
 
-def _rank(candidate: LoopCandidate) -> tuple[float, int]:
-    return -candidate.score, candidate.match
+def _rank(candidate: LoopCandidate) -> tuple[float, int, bool]:
+    return -candidate.score, candidate.match, candidate.guess is not None

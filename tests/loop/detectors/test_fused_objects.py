@@ -49,20 +49,22 @@ def proposed(views: list[LoopCandidate], submaps: list[LoopCandidate], **loops: 
     return detector.query(place(50, 0))
 
 
-def test_two_in_five_are_the_best_by_submaps_and_hold_a_guess() -> None:
+def test_the_best_submaps_are_proposed_beside_all_views() -> None:
     found = proposed(
         [by_view(match, 0.999 - 0.001 * match) for match in range(5)],
         [by_submap(10 + k, 0.55 - 0.005 * k) for k in range(4)],
     )
-    assert [candidate.match for candidate in found] == [0, 1, 2, 10, 11]
-    assert [candidate.guess is not None for candidate in found] == [False, False, False, True, True]
+    assert [candidate.match for candidate in found] == [0, 1, 2, 3, 4, 10, 11]
+    assert [candidate.guess is not None for candidate in found] == [False] * 5 + [True] * 2
     assert {candidate.detector for candidate in found} == {"fused-objects"}
     scores = [candidate.score for candidate in found]
     assert scores == sorted(scores, reverse=True)
 
 
-def test_each_fills_what_the_other_leaves_free() -> None:
+def test_submaps_fill_what_views_leave_free() -> None:
     assert [c.match for c in proposed([], [by_submap(k, 0.6 - 0.01 * k) for k in range(5)])] == [0, 1, 2, 3, 4]
+    one = proposed([by_view(9, 0.5)], [by_submap(k, 0.6 - 0.01 * k) for k in range(5)])
+    assert [c.match for c in one] == [0, 1, 2, 3, 9]
     assert [c.match for c in proposed([by_view(k, 0.9 - 0.1 * k) for k in range(5)], [])] == [0, 1, 2, 3, 4]
     assert proposed([], []) == []
 
@@ -72,12 +74,11 @@ def test_what_is_not_believed_is_not_proposed() -> None:
     assert proposed([], [by_submap(1, 0.49)], min_score=0.1)[0].score == pytest.approx(1 / (1 + np.e))
 
 
-def test_what_both_propose_is_as_probable_as_that_one_of_them_is_right() -> None:
-    (found,) = proposed([by_view(7, 0.6)], [by_submap(7, 0.51)])
-    alone = STEEP.probabilities([by_submap(7, 0.51)])[0]
-    assert found.score == pytest.approx(1 - 0.4 * (1 - alone))
-    assert found.guess is not None
-    assert found.evidence.figures.keys() == {"words", "matched_objects", "matched_walls", "rival"}
+def test_what_both_propose_is_proposed_with_and_without_a_guess() -> None:
+    sure = STEEP.probabilities([by_submap(7, 0.51)])[0]
+    first, second = proposed([by_view(7, 0.6)], [by_submap(7, 0.51)])
+    assert (first.match, first.score, first.guess is None) == (7, sure, False)
+    assert (second.match, second.score, second.guess is None) == (7, 0.6, True)
 
 
 def test_a_guess_is_right_within_half_a_metre_and_twenty_degrees() -> None:
