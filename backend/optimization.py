@@ -19,7 +19,7 @@ from semslam.backend.graph.factors import (
 )
 from semslam.backend.graph.products import Edge, GraphSolution, LoopVerdict, loop_edge
 from semslam.backend.robust.calibration import cycle_scale, loop_scale, odometry_scale
-from semslam.backend.robust.plausibility import Screening, screen_loops
+from semslam.backend.robust.plausibility import Screening, reconsider, screen_loops
 from semslam.backend.robust.second_start import SecondStart
 from semslam.backend.robust.strategy import (
     RobustProblem,
@@ -92,13 +92,20 @@ def optimize_graph(
     yield
     loops = [edge.widened(loop_factor) for edge in edges]
     odometry = [edge.widened(odometry_factor) for edge in problem.odometry]
-    screening = _screen(problem, odometry, loops, strategy, config)
+    chain = OdometryChain(problem.poses, odometry)
+    screening = _screen(chain, loops, strategy, config)
     yield
-    eligible = [loop for loop, fit in zip(loops, screening.eligible, strict=True) if fit]
     trusted = _trusted(problem, maps, start, odometry)
-    robust = RobustProblem(trusted, odometry, eligible, make_values(start), config.max_residual, config.max_iterations)
-    yield
-    result = yield from solve_robustly(strategy, robust)
+    values = make_values(start)
+    while True:
+        eligible = [loop for loop, fit in zip(loops, screening.eligible, strict=True) if fit]
+        robust = RobustProblem(trusted, odometry, eligible, values, config.max_residual, config.max_iterations)
+        yield
+        result = yield from solve_robustly(strategy, robust)
+        known, values = robust.weighted(result.weights), result.values
+        before, screening = screening, reconsider(chain, known, values, loops, screening, config.max_residual)
+        if screening.eligible.sum() == before.eligible.sum():
+            break
     if second_start is not None:
         result = yield from second_start(strategy, robust, result)
     poses = read_poses(result.values, problem.poses)
@@ -145,17 +152,10 @@ def _scales(problem: GraphProblem, loops: Sequence[Edge], config: BackendConfig)
     return max(of_cycles, odometry_scale(chain, widened, limit)), of_loops
 
 
-def _screen(
-    problem: GraphProblem,
-    odometry: Sequence[Edge],
-    loops: Sequence[Edge],
-    strategy: RobustStrategy,
-    config: BackendConfig,
-) -> Screening:
+def _screen(chain: OdometryChain, loops: Sequence[Edge], strategy: RobustStrategy, config: BackendConfig) -> Screening:
     """Which loops may take part, and why others may not."""
     if strategy.accepts_all or config.drift_slack == 0:
         return Screening(np.zeros(len(loops)), (None,) * len(loops))
-    chain = OdometryChain(problem.poses, odometry)
     return screen_loops(chain, loops, config.max_residual, config.drift_slack, config.joining_loops)
 
 

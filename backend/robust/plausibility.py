@@ -3,20 +3,22 @@
 Least squares counts every loop as evidence of its own. Loops between two rooms that look alike are not: they repeat
 one mistake, are consistent with one another, and together outweigh odometry however many there are. So before anything
 is optimised a loop must lie within what odometry can have drifted, groups of loops that odometry doubts are withheld,
-and so are loops that put one view at two places, unless one side is clearly the better founded.
+and so are loops that put one view at two places, unless one side is clearly the better founded. The loops that stand
+hold the graph closer than odometry does: by that graph those that were withheld are judged once more.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import gtsam
 import numpy as np
 
-from semslam.backend.graph.chain import BoolArray, OdometryChain, deviations, squared_mahalanobis
+from semslam.backend.graph.chain import BoolArray, OdometryChain, squared_mahalanobis
 from semslam.backend.graph.components import connected
 from semslam.backend.graph.products import Edge
 from semslam.backend.robust.calibration import cycles
+from semslam.backend.robust.drift import Drift
 from semslam.backend.robust.support import agreements, unsupported
-from semslam.geometry.se3 import invert
 from semslam.types import FloatArray, IntArray, RejectionReason
 
 NEAR = 5
@@ -34,9 +36,6 @@ CLEARLY = 3
 NEARER = 1.5
 """How many times as far from odometry a group must lie to be outweighed by another one: that much of it may be an error
 of the stated covariances."""
-STRONG = 6.0
-"""By how much its squared distance must be larger besides: odometry is 20 times as likely with the other one then,
-strong evidence by Kass and Raftery (1995)."""
 ALONE = 1.5
 """How many times the limit a pair must be off that alone sets two groups apart: one in a thousand is off by chance."""
 UNIT = 1.0
@@ -47,6 +46,26 @@ LOST = 1.0
 """Radians: beyond this one odometry does not know where the other end lies, and casts no doubt on a loop either."""
 BLOCK = 50_000
 """Pairs that are worked on at a time."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Demand:
+    """What is asked of a prediction before it decides.
+
+    Attributes:
+        distance: Mahalanobis distance up to which a group may lie from it.
+        margin: how much larger the squared distance of the other group must be, of two that contradict each other:
+            twice the logarithm of how many times as likely the prediction is with the one as with the other.
+    """
+
+    distance: float
+    margin: float
+
+
+ODOMETRY = _Demand(DOUBT, 6.0)
+"""Nine in ten true loops lie as near; strong evidence by Kass and Raftery (1995), 20 to 1."""
+GRAPH = _Demand(2.313, 10.0)
+"""Half of the true loops lie as near; very strong evidence, 150 to 1: a graph may itself hold a false loop."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -84,7 +103,7 @@ def screen_loops(
     """
     if not loops:
         return Screening(np.zeros(0), ())
-    drift = _drift(chain, loops)
+    drift = Drift.from_odometry(chain, loops)
     contradicted = (drift.distances > slack * max_residual) & (drift.headings < LINEAR)
     reasons: list[RejectionReason | None] = [RejectionReason.INCONSISTENT if no else None for no in contradicted]
     alone = unsupported(chain, loops, max_residual, support)
@@ -92,42 +111,50 @@ def screen_loops(
         reasons[index] = RejectionReason.UNSUPPORTED
     plausible = np.flatnonzero(~contradicted & ~alone)
     chosen = [loops[i] for i in plausible.tolist()]
-    for index in plausible[_ambiguous(chain, chosen, drift.of(plausible), max_residual)]:
+    for index in plausible[_ambiguous(chain, chosen, drift.of(plausible), ODOMETRY, max_residual)]:
         reasons[index] = RejectionReason.AMBIGUOUS
     return Screening(drift.distances, tuple(reasons))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Drift:
-    """What separates loops from odometry alone.
+def reconsider(
+    chain: OdometryChain,
+    graph: gtsam.NonlinearFactorGraph,
+    values: gtsam.Values,
+    loops: Sequence[Edge],
+    screening: Screening,
+    max_residual: float,
+) -> Screening:
+    """Judge ambiguous loops once more, by what a graph without them says of their ends.
 
-    Attributes:
-        distances: (L,) Mahalanobis distances, 0 where odometry does not join the ends.
-        shifts: (L, 6) the same as rotation vectors and translations.
-        headings: (L,) standard deviation of odometry's heading between the ends, radians.
+    The loops of other places hold a graph far closer than odometry alone does, so that it often tells which of two
+    rooms that look alike a view is in.
+
+    Args:
+        chain: odometry, its covariance widened where it was too small.
+        graph: odometry and the loops that were accepted.
+        values: its optimum.
+        loops: edges that may be false, as they were screened.
+        screening: what was said of them.
+        max_residual: Mahalanobis distance up to which a single loop counts as true.
+
+    Raises:
+        RuntimeError: GTSAM's own, where the system is indeterminate.
     """
-
-    distances: FloatArray
-    shifts: FloatArray
-    headings: FloatArray
-
-    def of(self, rows: IntArray) -> "_Drift":
-        """The same of some loops."""
-        return _Drift(self.distances[rows], self.shifts[rows], self.headings[rows])
-
-
-def _drift(chain: OdometryChain, loops: Sequence[Edge]) -> _Drift:
-    T, covariance, joined = chain.relative([e.from_key for e in loops], [e.to_key for e in loops])
-    shifts = deviations(invert(np.stack([loop.T_from_to for loop in loops])) @ T)
-    own = np.stack([loop.covariance for loop in loops])
-    distances = np.zeros(len(loops))
-    distances[joined] = np.sqrt(squared_mahalanobis(shifts[joined], (own + covariance)[joined]))
-    headings = np.sqrt(np.maximum(np.trace(covariance[:, :3, :3], axis1=1, axis2=2), 0.0))
-    return _Drift(distances, shifts, headings)
+    waiting = np.flatnonzero([reason is RejectionReason.AMBIGUOUS for reason in screening.reasons])
+    if not len(waiting):
+        return screening
+    chosen = [loops[i] for i in waiting.tolist()]
+    still = _ambiguous(chain, chosen, Drift.from_graph(graph, values, chosen), GRAPH, max_residual)
+    reasons = list(screening.reasons)
+    for index in waiting[~still]:
+        reasons[index] = None
+    return Screening(screening.distances, tuple(reasons))
 
 
-def _ambiguous(chain: OdometryChain, loops: Sequence[Edge], drift: _Drift, max_residual: float) -> BoolArray:
-    """(L,) loops of groups that odometry leaves in doubt, or that another group contradicts and does not lose to.
+def _ambiguous(
+    chain: OdometryChain, loops: Sequence[Edge], drift: Drift, demand: _Demand, max_residual: float
+) -> BoolArray:
+    """(L,) loops of groups that the prediction leaves in doubt, or that another group contradicts and does not lose to.
 
     A group is what follows one another on both passes; between two maps, all that place the one alike in the other.
     """
@@ -143,7 +170,9 @@ def _ambiguous(chain: OdometryChain, loops: Sequence[Edge], drift: _Drift, max_r
     size = [len(component) for component in members]
     typical = [max(float(np.median(drift.distances[component])), UNIT) for component in members]
     known = _is_apart(drift.shifts) & (drift.headings < LOST)
-    doubtful = [typical[g] > DOUBT and bool(np.median(known[component])) for g, component in enumerate(members)]
+    doubtful = [
+        typical[g] > demand.distance and bool(np.median(known[component])) for g, component in enumerate(members)
+    ]
     withheld = np.array(doubtful, dtype=bool)[group]
     first, second, off = pairs.first[pairs.meeting], pairs.second[pairs.meeting], off[pairs.meeting]
     a, b = np.minimum(group[first], group[second]), np.maximum(group[first], group[second])
@@ -151,7 +180,7 @@ def _ambiguous(chain: OdometryChain, loops: Sequence[Edge], drift: _Drift, max_r
         shared = (a == g) & (b == h)
         if np.median(off[shared]) <= (DOUBT if shared.sum() > 1 else ALONE * DOUBT):
             continue
-        stands = [_outweighs(size[m], typical[m], size[o], typical[o]) for m, o in ((g, h), (h, g))]
+        stands = [_outweighs(size[m], typical[m], size[o], typical[o], demand.margin) for m, o in ((g, h), (h, g))]
         for mine, its in zip((g, h), stands, strict=True):
             withheld[group == mine] |= not its
         # Where one side stands, a contradiction that rests on a loop or two is no evidence against other places.
@@ -196,18 +225,18 @@ def _third_side(loops: Sequence[Edge], first: IntArray, second: IntArray) -> Boo
     return np.asarray((np.abs(np.sort(ends)[:, None] - places[None]) <= NEAR).all(2).any(1))
 
 
-def _outweighs(size: int, distance: float, other_size: int, other_distance: float) -> bool:
+def _outweighs(size: int, distance: float, other_size: int, other_distance: float, margin: float) -> bool:
     """Whether a group stands although another contradicts it; a loop or two cannot bring down a large group."""
     larger = size >= CLEARLY * other_size
     if larger and other_size < CLEARLY:
         return True
-    nearer = _is_nearer(distance, other_distance)
-    return (nearer and CLEARLY * size >= other_size) or (larger and not _is_nearer(other_distance, distance))
+    nearer = _is_nearer(distance, other_distance, margin)
+    return (nearer and CLEARLY * size >= other_size) or (larger and not _is_nearer(other_distance, distance, margin))
 
 
-def _is_nearer(distance: float, other_distance: float) -> bool:
-    """Whether odometry prefers the first of two distances, even if it states too small a covariance."""
-    return NEARER * distance <= other_distance and other_distance**2 - distance**2 >= STRONG
+def _is_nearer(distance: float, other_distance: float, margin: float) -> bool:
+    """Whether a prediction prefers the first of two distances, even if it states too small a covariance."""
+    return NEARER * distance <= other_distance and other_distance**2 - distance**2 >= margin
 
 
 @dataclass(frozen=True, slots=True, eq=False)
