@@ -91,7 +91,7 @@ class SubmapRegistration:
         # The less both have seen in common, the surer must be what there is.
         limit = config.max_free_space if overlap >= config.much_overlap else config.max_free_space_little
         gates = (
-            self._stays(T_guess, T),
+            self._stays(T_guess, T, config.max_shift),
             Gate(overlap >= config.min_overlap, RejectionReason.LOW_OVERLAP, overlap, config.min_overlap),
             Gate(filled <= limit, RejectionReason.FREE_SPACE, filled, limit),
         )
@@ -118,7 +118,7 @@ class SubmapRegistration:
         overlap = min(there.fitness, back.fitness)
         sigma = float(np.sqrt(np.linalg.eigvalsh((found + self._systematic)[3:, 3:])[-1]))
         gates = (
-            self._stays(anchors.T_match_query, T),
+            self._stays(anchors.T_match_query, T, config.max_view_shift),
             Gate(overlap >= config.min_view_overlap, RejectionReason.LOW_OVERLAP, overlap, config.min_view_overlap),
             Gate(fit.rmse <= config.max_rmse, RejectionReason.HIGH_RMSE, fit.rmse, config.max_rmse),
             Gate(sigma <= config.max_sigma, RejectionReason.DEGENERATE, sigma, config.max_sigma),
@@ -139,12 +139,12 @@ class SubmapRegistration:
             between=(anchors.query.id, anchors.match.id),
         )
 
-    def _stays(self, T_guess: FloatArray, T: FloatArray) -> Gate:
+    def _stays(self, T_guess: FloatArray, T: FloatArray, max_shift: float) -> Gate:
         """Whether a registration stays near what it began with."""
-        change, config = invert(T_guess) @ T, self._config
+        change = invert(T_guess) @ T
         moved = float(np.linalg.norm(change[:3, 3]))
-        stayed = moved <= config.max_shift and float(rotation_angle(change)) <= config.max_turn
-        return Gate(stayed, RejectionReason.FAR_FROM_GUESS, moved, config.max_shift)
+        stayed = moved <= max_shift and float(rotation_angle(change)) <= self._config.max_turn
+        return Gate(stayed, RejectionReason.FAR_FROM_GUESS, moved, max_shift)
 
     def _covariance(self, ours: Cloud, theirs: Cloud, T: FloatArray, fit: Fit) -> FloatArray:
         """Covariance (6, 6) of T: that of point-to-plane ICP, inflated."""

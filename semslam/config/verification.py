@@ -16,6 +16,9 @@ class SubmapConfig(Section):
     )
     max_shift: float = setting(0.8, "motion that the registration may add to the guess", unit="m", gt=0)
     max_turn: float = setting(0.35, "rotation that the registration may add to the guess", unit="rad", gt=0)
+    max_view_shift: float = setting(
+        0.15, "motion that the registration of the two views may add to that of the submaps", unit="m", gt=0
+    )
     min_points: int = setting(2500, "minimum number of points of each submap", gt=5)
     min_overlap: float = setting(0.2, "share of either submap that must lie near the other", ge=0, le=1)
     much_overlap: float = setting(0.3, "share from which on max_free_space holds", ge=0, le=1)

@@ -29,10 +29,11 @@ def candidate(T_match_query: FloatArray) -> LoopCandidate:
     return LoopCandidate(3, 1, 0.5, "objects", guess=SubmapGuess(rows, (2, 3), (0, 1)))
 
 
-def verify(T_guess: FloatArray, views: list[Keyframe]) -> LoopConstraint | LoopRejection:
+def verify(T_guess: FloatArray, views: list[Keyframe], **submaps: float) -> LoopConstraint | LoopRejection:
     proposed = candidate(T_guess)
     query, match = ends_of(proposed, views)
-    return IcpVerifier.from_config(Config()).verify(query, match, proposed)
+    config = Config().with_changes(verification={"submaps": submaps})
+    return IcpVerifier.from_config(config).verify(query, match, proposed)
 
 
 def test_a_guess_is_refined() -> None:
@@ -56,6 +57,15 @@ def test_a_guess_that_puts_walls_into_free_space_is_rejected() -> None:
     true = invert(POSES[1]) @ POSES[3]
     turned = true @ make_transform(exp_so3([0.0, np.pi / 2, 0.0]), [0.0, 0.0, 0.0])
     assert isinstance(verify(turned, keyframes()), LoopRejection)
+
+
+def test_views_whose_registration_leaves_that_of_the_submaps_are_rejected() -> None:
+    true, views = invert(POSES[1]) @ POSES[3], keyframes()
+    outcome = verify(true, views, max_view_shift=1e-6)
+    assert isinstance(outcome, LoopRejection)
+    assert (outcome.reason, outcome.limit) == ("far_from_guess", 1e-6)
+    assert outcome.figure < 0.15, "by default it passes"
+    assert isinstance(verify(true, views), LoopConstraint)
 
 
 def test_a_submap_without_points_is_rejected() -> None:
