@@ -35,7 +35,7 @@ class Config(Section):
 
     seed: int = setting(0, "seed of everything that draws random numbers", ge=0, lt=2**31)
     odometry: str = setting("feature_map", "registered odometry")
-    detector: str = setting("fused", "registered loop detector; 'none' = no loops")
+    detector: str = setting("fused-objects", "registered loop detector; 'none' = no loops")
     dataset: DatasetConfig = DatasetConfig()
     keypoints: KeypointConfig = KeypointConfig()
     keyframes: KeyframeConfig = KeyframeConfig()

@@ -30,7 +30,7 @@ def semslam(*arguments: str) -> subprocess.CompletedProcess[str]:
 def test_a_run_does_not_import_it(tmp_path: Path) -> None:
     done = semslam("run", "synthetic:room?frames=12", "--out", str(tmp_path / "run"))
     assert done.returncode == 0, done.stderr
-    assert '"detector": "fused"' in (tmp_path / "run" / "metrics.json").read_text()
+    assert '"detector": "fused-objects"' in (tmp_path / "run" / "metrics.json").read_text()
 
 
 def test_doctor_calls_an_installation_without_it_usable() -> None:
