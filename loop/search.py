@@ -129,13 +129,22 @@ class LoopSearch:
         return id not in self._forgotten
 
     def find(self, keyframe: Keyframe, frame: Frame, labels: LabelMap | None = None) -> list[Verification]:
-        """Look for a place without taking the keyframe in; arguments and result are those of ``search``."""
+        """Look for a place without taking the keyframe in, at most one loop to each earlier one; see ``search``."""
         view = self._view(keyframe, frame, labels)
         with one_blas_thread():
             candidates = self._detector.query(view)
         known = [*self._keyframes, keyframe]
-        outcomes = [self._verifier.verify(*ends_of(candidate, known), candidate) for candidate in candidates]
-        return [at_candidate(one, known) if isinstance(one, LoopConstraint) else one for one in outcomes]
+        found: dict[int, LoopConstraint] = {}
+        outcomes: list[Verification] = []
+        for candidate in _views_first(candidates):
+            if candidate.match in found:
+                outcomes.append(LoopRejection(candidate, RejectionReason.REDUNDANT, 1, 1))
+                continue
+            outcome = self._verifier.verify(*ends_of(candidate, known), candidate)
+            if isinstance(outcome, LoopConstraint):
+                outcome = found[candidate.match] = at_candidate(outcome, known)
+            outcomes.append(outcome)
+        return outcomes
 
     def forget(self, ids: Collection[int]) -> None:
         """Propose these keyframes no more, and free what was kept of them.

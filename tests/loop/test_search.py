@@ -179,6 +179,24 @@ def test_views_are_verified_before_submaps_whatever_their_scores_are() -> None:
     assert [candidate.match for candidate in verifier.asked] == [8, 2, 5]
 
 
+def test_a_place_is_found_once_where_a_view_and_a_submap_name_it() -> None:
+    class Both(EveryOldOne):
+        def query(self, view: KeyframeView) -> list[LoopCandidate]:
+            guess = SubmapGuess(tuple(map(tuple, np.eye(4).tolist())), (FIRST,), (5,))
+            both = [LoopCandidate(FIRST, 5, 0.9, "both", guess=guess), LoopCandidate(FIRST, 5, 0.6, "both")]
+            return both if view.keyframe.id == FIRST else []
+
+    search = LoopSearch(Both(), None, Standing(), LoopConfig(follow=0))  # type: ignore[arg-type]
+    images = np.zeros((48, 64, 3), np.uint8), np.zeros((48, 64), np.float32)
+    frames = [Frame(number, float(number), *images, CAMERA) for number in range(FIRST + 1)]
+    for number in range(FIRST):
+        search.search(keyframe(number), frames[number])
+    view, submap = search.find(keyframe(FIRST), frames[FIRST])
+    assert isinstance(view, LoopConstraint)
+    assert isinstance(submap, LoopRejection)
+    assert submap.reason is RejectionReason.REDUNDANT
+
+
 @pytest.mark.parametrize("per_place", [0, 2])
 def test_beyond_a_number_of_keyframes_those_that_say_nothing_new_are_not_kept(per_place: int) -> None:
     detector, verifier = Forgetful(), Standing()
