@@ -1,6 +1,6 @@
 """Loops that would repeat what loops between neighbouring keyframes have closed already."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 
 from semslam.types import Keyframe, LoopConstraint
 
@@ -35,6 +35,17 @@ class ClosedPlaces:
     def joins(self, query: int, match: int) -> bool:
         """Whether a verified loop is between these two keyframes."""
         return match in self._matches.get(query, ())
+
+    def touch(self, queries: Collection[int], matches: Collection[int]) -> bool:
+        """Whether a verified loop joins neighbours of any keyframes of two submaps.
+
+        Args:
+            queries: the newer submap's.
+            matches: the older one's.
+        """
+        near = range(min(queries) - NEIGHBOURHOOD, max(queries) + NEIGHBOURHOOD + 1)
+        oldest, newest = min(matches) - NEIGHBOURHOOD, max(matches) + NEIGHBOURHOOD
+        return any(oldest <= match <= newest for query in near for match in self._matches.get(query, ()))
 
     def loops(self, query: int, match: int, keyframes: Sequence[Keyframe]) -> int:
         """How many verified loops join the neighbours of two keyframes; only keyframes of one map are neighbours.

@@ -229,11 +229,12 @@ class LoopSearch:
     def _already_closed(self, candidate: LoopCandidate) -> LoopRejection | None:
         """The rejection of a candidate whose loop would repeat others, as far as that is known before verifying it."""
         repeated = self._repeated(candidate, candidate.query, candidate.match)
-        if repeated is not None or candidate.guess is None:
+        guess = candidate.guess
+        if repeated is not None or guess is None or not self._closed.touch(guess.query, guess.match):
             return repeated
         query, match = ends_of(candidate, self._keyframes)
         with self._stopwatch.stage("anchors"):
-            expected = choose_anchors(query, match, np.array(candidate.guess.T_match_query))
+            expected = choose_anchors(query, match, np.array(guess.T_match_query))
         return self._repeated(candidate, expected.query.id, expected.match.id)
 
     def _repeated(self, candidate: LoopCandidate, query: int, match: int) -> LoopRejection | None:

@@ -9,7 +9,7 @@ import pytest
 from semslam.config import LoopConfig
 from semslam.geometry.camera import Intrinsics
 from semslam.loop.detector import Look
-from semslam.loop.redundancy import NEIGHBOURHOOD
+from semslam.loop.redundancy import NEIGHBOURHOOD, ClosedPlaces
 from semslam.loop.search import LoopSearch
 from semslam.types import (
     Cloud,
@@ -222,3 +222,13 @@ def test_a_keyframe_that_stands_elsewhere_is_kept() -> None:
     for number in range(9):
         search.search(keyframe(number), Frame(number, float(number), *images, CAMERA))
     assert detector.kept == list(range(9))
+
+
+def test_a_loop_touches_two_submaps_where_it_joins_neighbours_of_any_of_their_keyframes() -> None:
+    closed = ClosedPlaces()
+    closed.recall([(20, 5)])
+    assert closed.touch([16, 17, 18], [7, 8])
+    assert closed.touch([22, 23], [1, 2, 3])
+    assert not closed.touch([15, 16, 17], [7, 8]), "the query is three keyframes off"
+    assert not closed.touch([16, 17, 18], [8, 9]), "the match is"
+    assert not ClosedPlaces().touch([20], [5])
