@@ -102,6 +102,7 @@ def optimize_graph(
         robust = RobustProblem(trusted, odometry, eligible, values, config.max_residual, config.max_iterations)
         yield
         result = yield from solve_robustly(strategy, robust)
+        yield
         known, values = robust.weighted(result.weights), result.values
         before, screening = screening, reconsider(chain, known, values, loops, screening, config.max_residual)
         if screening.eligible.sum() == before.eligible.sum():

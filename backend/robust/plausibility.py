@@ -136,15 +136,16 @@ def reconsider(
         loops: edges that may be false, as they were screened.
         screening: what was said of them.
         max_residual: Mahalanobis distance up to which a single loop counts as true.
-
-    Raises:
-        RuntimeError: GTSAM's own, where the system is indeterminate.
     """
     waiting = np.flatnonzero([reason is RejectionReason.AMBIGUOUS for reason in screening.reasons])
     if not len(waiting):
         return screening
     chosen = [loops[i] for i in waiting.tolist()]
-    still = _ambiguous(chain, chosen, Drift.from_graph(graph, values, chosen), GRAPH, max_residual)
+    try:
+        drift = Drift.from_graph(graph, values, chosen)
+    except RuntimeError:  # GTSAM's own: a graph that leaves something open decides nothing
+        return screening
+    still = _ambiguous(chain, chosen, drift, GRAPH, max_residual)
     reasons = list(screening.reasons)
     for index in waiting[~still]:
         reasons[index] = None

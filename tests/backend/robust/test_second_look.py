@@ -10,6 +10,7 @@ from semslam.backend.graph.chain import OdometryChain
 from semslam.backend.graph.factors import between_factor, make_values, prior_factor
 from semslam.backend.pose_graph import Edge, PoseGraph
 from semslam.backend.robust.drift import Drift
+from semslam.backend.robust.plausibility import reconsider, screen_loops
 from semslam.geometry.se3 import compose, make_transform
 
 TOUR = ring(15, laps=1, radius=0.8)
@@ -124,3 +125,15 @@ def test_ends_that_odometry_does_not_join_lie_nowhere():
     edges = [edge for edge in odometry_of(np.random.default_rng(0), 0.0) if edge.from_key != 30]
     drift = Drift.from_odometry(OdometryChain(range(len(TRUTH)), edges), [Edge(3, 110, np.eye(4), np.eye(6))])
     assert drift.distances.tolist() == [0.0]
+
+
+def test_a_graph_that_leaves_something_open_decides_nothing():
+    rng = np.random.default_rng(0)
+    _, true, false = rooms(rng)
+    edges, loops = odometry_of(rng, 2.15), [*true, *false]
+    chain = OdometryChain(range(len(TRUTH)), edges)
+    screened = screen_loops(chain, loops, 4.7, 1.5)
+    assert set(screened.reasons) == {"ambiguous"}
+    graph, values = graph_of(edges)
+    graph.remove(0)  # the prior: nothing holds the graph
+    assert reconsider(chain, graph, values, loops, screened, 4.7) is screened
