@@ -13,24 +13,13 @@ from dataclasses import dataclass
 import gtsam
 import numpy as np
 
-from semslam.backend.graph.chain import BoolArray, OdometryChain, squared_mahalanobis
-from semslam.backend.graph.components import connected
+from semslam.backend.graph.chain import BoolArray, OdometryChain
 from semslam.backend.graph.products import Edge
-from semslam.backend.robust.calibration import cycles
 from semslam.backend.robust.drift import Drift
-from semslam.backend.robust.support import agreements, unsupported
+from semslam.backend.robust.hypotheses import DOUBT, NEAR, find_hypotheses, is_apart
+from semslam.backend.robust.support import unsupported
 from semslam.types import FloatArray, IntArray, RejectionReason
 
-NEAR = 5
-"""Keyframes that count as the same place, in time."""
-REACH = 10
-"""Keyframes within which, on either pass, loops are of one hypothesis: that the second pass is along the first."""
-APART = 1.0
-"""Metres between two places: nearer ones are in one view, and what parts them is a slip of odometry."""
-TURNED = 0.5
-"""Radians; the same of headings."""
-DOUBT = 3.263
-"""Mahalanobis distance below which nine in ten true loops lie (6 degrees of freedom)."""
 CLEARLY = 3
 """How many times as many loops a group needs to outweigh another one."""
 NEARER = 1.5
@@ -44,8 +33,6 @@ LINEAR = 0.5
 """Radians: beyond this deviation of heading (root of the sum over three axes) odometry contradicts no loop."""
 LOST = 1.0
 """Radians: beyond this one odometry does not know where the other end lies, and casts no doubt on a loop either."""
-BLOCK = 50_000
-"""Pairs that are worked on at a time."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,27 +142,17 @@ def reconsider(
 def _ambiguous(
     chain: OdometryChain, loops: Sequence[Edge], drift: Drift, demand: _Demand, max_residual: float
 ) -> BoolArray:
-    """(L,) loops of groups that the prediction leaves in doubt, or that another group contradicts and does not lose to.
-
-    A group is what follows one another on both passes; between two maps, all that place the one alike in the other.
-    """
-    pairs = _pairs(chain, loops)
-    off = _openness(chain, loops, pairs.first, pairs.second)
-    closing = pairs.along & (off <= DOUBT)
-    alike = np.column_stack([pairs.first[closing], pairs.second[closing]])
-    joined = np.concatenate([alike, agreements(chain, loops, max_residual)])
-    members = [list(component) for component in connected(range(len(loops)), map(tuple, joined.tolist()))]
-    group = np.zeros(len(loops), dtype=np.int64)
-    for number, component in enumerate(members):
-        group[component] = number
+    """(L,) loops of groups that the prediction doubts, or that another group contradicts and does not lose to."""
+    found = find_hypotheses(chain, loops, max_residual)
+    group, members = found.group, [list(component) for component in found.members]
     size = [len(component) for component in members]
     typical = [max(float(np.median(drift.distances[component])), UNIT) for component in members]
-    known = _is_apart(drift.shifts) & (drift.headings < LOST)
+    known = is_apart(drift.shifts) & (drift.headings < LOST)
     doubtful = [
         typical[g] > demand.distance and bool(np.median(known[component])) for g, component in enumerate(members)
     ]
     withheld = np.array(doubtful, dtype=bool)[group]
-    first, second, off = pairs.first[pairs.meeting], pairs.second[pairs.meeting], off[pairs.meeting]
+    first, second, off = found.first, found.second, found.off
     a, b = np.minimum(group[first], group[second]), np.maximum(group[first], group[second])
     for g, h in np.unique(np.column_stack([a, b])[a != b], axis=0).tolist():
         shared = (a == g) & (b == h)
@@ -188,27 +165,6 @@ def _ambiguous(
         if not (any(stands) and min(size[g], size[h]) < CLEARLY):
             withheld |= _third_side(loops, first[shared], second[shared])
     return withheld
-
-
-def _openness(chain: OdometryChain, loops: Sequence[Edge], first: IntArray, second: IntArray) -> FloatArray:
-    """Mahalanobis distance (P,) that the cycle through each pair of loops is from closing.
-
-    0 where what is left of it does not make two places of one.
-    """
-    off = np.zeros(len(first))
-    for begin in range(0, len(first), BLOCK):
-        block = slice(begin, begin + BLOCK)
-        cycle = cycles(chain, loops, first[block], second[block])
-        open_ = _is_apart(cycle.errors)
-        covariances = (cycle.loops + cycle.odometry)[open_]
-        off[block][open_] = np.sqrt(squared_mahalanobis(cycle.errors[open_], covariances))
-    return off
-
-
-def _is_apart(deviations: FloatArray) -> BoolArray:
-    """(L,) whether deviations (L, 6) are between two places, and not a slip of odometry within one."""
-    turned = np.linalg.norm(deviations[:, :3], axis=1) > TURNED
-    return np.asarray(turned | (np.linalg.norm(deviations[:, 3:], axis=1) > APART))
 
 
 def _third_side(loops: Sequence[Edge], first: IntArray, second: IntArray) -> BoolArray:
@@ -238,42 +194,3 @@ def _outweighs(size: int, distance: float, other_size: int, other_distance: floa
 def _is_nearer(distance: float, other_distance: float, margin: float) -> bool:
     """Whether a prediction prefers the first of two distances, even if it states too small a covariance."""
     return NEARER * distance <= other_distance and other_distance**2 - distance**2 >= margin
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Pairs:
-    """Pairs of loops that bear on one another.
-
-    Attributes:
-        first, second: (P,) indices of the loops.
-        meeting: (P,) whether they have a view in common, at one end at the least.
-        along: (P,) whether the one follows the other on both passes.
-    """
-
-    first: IntArray
-    second: IntArray
-    meeting: BoolArray
-    along: BoolArray
-
-
-def _pairs(chain: OdometryChain, loops: Sequence[Edge]) -> _Pairs:
-    queries = np.array([loop.to_key for loop in loops], dtype=np.int64)
-    matches = np.array([loop.from_key for loop in loops], dtype=np.int64)
-    near = np.unique(np.concatenate([_close(queries, REACH), _close(matches, NEAR)]), axis=0)
-    first, second = near.T
-    by_query, by_match = np.abs(queries[first] - queries[second]), np.abs(matches[first] - matches[second])
-    meeting = (by_query <= NEAR) | (by_match <= NEAR)
-    along = (by_query <= REACH) & (by_match <= REACH)
-    of_one_map = [chain.joins(ends[first], ends[second]) for ends in (matches, queries)]
-    kept = (meeting | along) & of_one_map[0] & of_one_map[1]
-    return _Pairs(first[kept], second[kept], meeting[kept], along[kept])
-
-
-def _close(keys: IntArray, reach: int) -> IntArray:
-    """Index pairs (P, 2), ascending, whose keys differ by at most ``reach``."""
-    order = np.argsort(keys, kind="stable")
-    places = np.arange(len(keys))
-    counts = np.searchsorted(keys[order], keys[order] + reach, side="right") - places - 1
-    first = np.repeat(places, counts)
-    second = first + 1 + np.arange(len(first)) - np.repeat(np.cumsum(counts) - counts, counts)
-    return np.sort(np.column_stack([order[first], order[second]]), axis=1)
