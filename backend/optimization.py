@@ -1,7 +1,7 @@
 """From a checked graph to a solution: maps placed, too small covariances widened, loops accepted or withdrawn."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import gtsam
 import numpy as np
@@ -19,6 +19,7 @@ from semslam.backend.graph.factors import (
 )
 from semslam.backend.graph.products import Edge, GraphSolution, LoopVerdict, loop_edge
 from semslam.backend.robust.calibration import cycle_scale, loop_scale, odometry_scale
+from semslam.backend.robust.outvoting import outvote
 from semslam.backend.robust.plausibility import Screening, reconsider, screen_loops
 from semslam.backend.robust.second_start import SecondStart
 from semslam.backend.robust.strategy import (
@@ -93,18 +94,18 @@ def optimize_graph(
     loops = [edge.widened(loop_factor) for edge in edges]
     odometry = [edge.widened(odometry_factor) for edge in problem.odometry]
     chain = OdometryChain(problem.poses, odometry)
-    screening = _screen(chain, loops, strategy, config)
-    yield
     trusted = _trusted(problem, maps, start, odometry)
-    values = make_values(start)
+    whole = RobustProblem(trusted, odometry, loops, make_values(start), config.max_residual, config.max_iterations)
+    screening = yield from _screen(chain, whole, strategy, config)
+    robust = whole
     while True:
         eligible = [loop for loop, fit in zip(loops, screening.eligible, strict=True) if fit]
-        robust = RobustProblem(trusted, odometry, eligible, values, config.max_residual, config.max_iterations)
+        robust = replace(robust, loops=eligible)
         yield
         result = yield from solve_robustly(strategy, robust)
         yield
-        known, values = robust.weighted(result.weights), result.values
-        before, screening = screening, reconsider(chain, known, values, loops, screening, config.max_residual)
+        known, robust = robust.weighted(result.weights), replace(robust, initial=result.values)
+        before, screening = screening, reconsider(chain, known, result.values, loops, screening, config.max_residual)
         if screening.eligible.sum() == before.eligible.sum():
             break
     if second_start is not None:
@@ -153,11 +154,16 @@ def _scales(problem: GraphProblem, loops: Sequence[Edge], config: BackendConfig)
     return max(of_cycles, odometry_scale(chain, widened, limit)), of_loops
 
 
-def _screen(chain: OdometryChain, loops: Sequence[Edge], strategy: RobustStrategy, config: BackendConfig) -> Screening:
+def _screen(
+    chain: OdometryChain, problem: RobustProblem, strategy: RobustStrategy, config: BackendConfig
+) -> Steps[Screening]:
     """Which loops may take part, and why others may not."""
     if strategy.accepts_all or config.drift_slack == 0:
-        return Screening(np.zeros(len(loops)), (None,) * len(loops))
-    return screen_loops(chain, loops, config.max_residual, config.drift_slack, config.joining_loops)
+        return Screening(np.zeros(len(problem.loops)), (None,) * len(problem.loops))
+    loops = problem.loops
+    screening = screen_loops(chain, loops, config.max_residual, config.drift_slack, config.joining_loops)
+    yield
+    return (yield from outvote(chain, problem, screening))
 
 
 def _trusted(

@@ -22,6 +22,8 @@ TURNED = 0.5
 """Radians; the same of headings."""
 DOUBT = 3.263
 """Mahalanobis distance below which nine in ten true loops lie (6 degrees of freedom)."""
+TYPICAL = 2.313
+"""The same of half of the true loops."""
 BLOCK = 50_000
 """Pairs that are worked on at a time."""
 

@@ -16,7 +16,7 @@ import numpy as np
 from semslam.backend.graph.chain import BoolArray, OdometryChain
 from semslam.backend.graph.products import Edge
 from semslam.backend.robust.drift import Drift
-from semslam.backend.robust.hypotheses import DOUBT, NEAR, find_hypotheses, is_apart
+from semslam.backend.robust.hypotheses import DOUBT, NEAR, TYPICAL, find_hypotheses, is_apart
 from semslam.backend.robust.support import unsupported
 from semslam.types import FloatArray, IntArray, RejectionReason
 
@@ -51,7 +51,7 @@ class _Demand:
 
 ODOMETRY = _Demand(DOUBT, 6.0)
 """Nine in ten true loops lie as near; strong evidence by Kass and Raftery (1995), 20 to 1."""
-GRAPH = _Demand(2.313, 10.0)
+GRAPH = _Demand(TYPICAL, 10.0)
 """Half of the true loops lie as near; very strong evidence, 150 to 1: a graph may itself hold a false loop."""
 
 

@@ -10,7 +10,10 @@ from semslam.backend.graph.chain import OdometryChain
 from semslam.backend.graph.factors import between_factor, make_values, prior_factor
 from semslam.backend.pose_graph import Edge, PoseGraph
 from semslam.backend.robust.drift import Drift
+from semslam.backend.robust.outvoting import outvote
 from semslam.backend.robust.plausibility import reconsider, screen_loops
+from semslam.backend.robust.strategy import RobustProblem
+from semslam.backend.steps import finish
 from semslam.geometry.se3 import compose, make_transform
 
 TOUR = ring(15, laps=1, radius=0.8)
@@ -137,3 +140,24 @@ def test_a_graph_that_leaves_something_open_decides_nothing():
     graph, values = graph_of(edges)
     graph.remove(0)  # the prior: nothing holds the graph
     assert reconsider(chain, graph, values, loops, screened, 4.7) is screened
+
+
+def outvoted(edges, loops, held=True):
+    """Reasons after larger groups have been heard, and before."""
+    chain = OdometryChain(range(len(TRUTH)), edges)
+    graph, values = graph_of(edges)
+    if not held:
+        graph.remove(0)  # the prior
+    screening = screen_loops(chain, loops, 4.7, 1.5)
+    assert screening.eligible.all(), "odometry alone excludes none"
+    return finish(outvote(chain, RobustProblem(graph, edges, loops, values, 4.0, 20), screening)).reasons
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2, 4])
+def test_a_few_loops_into_a_twin_that_nothing_else_contradicts_are_outvoted_by_the_hall(seed):
+    hall, true, false = rooms(np.random.default_rng(seed))
+    edges = odometry_of(np.random.default_rng(seed + 10), 2.15)
+    assert outvoted(edges, [*hall, *false[:3]]) == (*(None,) * 10, *("ambiguous",) * 3)
+    assert outvoted(edges, [*hall, *true[:3]]) == (None,) * 13
+    assert outvoted(edges, [*hall, *false[:4]]) == (None,) * 14, "ten are not three times as many as four"
+    assert outvoted(edges, [*hall, *false[:3]], held=False) == (None,) * 13
