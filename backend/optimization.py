@@ -95,19 +95,19 @@ def optimize_graph(
     odometry = [edge.widened(odometry_factor) for edge in problem.odometry]
     chain = OdometryChain(problem.poses, odometry)
     trusted = _trusted(problem, maps, start, odometry)
-    whole = RobustProblem(trusted, odometry, loops, make_values(start), config.max_residual, config.max_iterations)
-    screening = yield from _screen(chain, whole, strategy, config)
-    robust = whole
+    robust = RobustProblem(trusted, odometry, loops, make_values(start), config.max_residual, config.max_iterations)
+    screening = yield from _screen(chain, robust, strategy, config)
     while True:
         eligible = [loop for loop, fit in zip(loops, screening.eligible, strict=True) if fit]
         robust = replace(robust, loops=eligible)
         yield
         result = yield from solve_robustly(strategy, robust)
         yield
-        known, robust = robust.weighted(result.weights), replace(robust, initial=result.values)
-        before, screening = screening, reconsider(chain, known, result.values, loops, screening, config.max_residual)
-        if screening.eligible.sum() == before.eligible.sum():
+        known = robust.weighted(result.weights)
+        again = reconsider(chain, known, result.values, loops, screening, config.max_residual)
+        if again.reasons == screening.reasons:
             break
+        screening, robust = again, replace(robust, initial=result.values)
     if second_start is not None:
         result = yield from second_start(strategy, robust, result)
     poses = read_poses(result.values, problem.poses)

@@ -12,10 +12,9 @@ import argparse
 
 import numpy as np
 
-from semslam.backend.analysis.judge import constraint_of
+from semslam.backend.analysis.judge import constraint_of, rebuilt
 from semslam.backend.analysis.simulation import measure, measure_odometry, ring
-from semslam.backend.graph.products import Edge
-from semslam.backend.pose_graph import PoseGraph
+from semslam.config import BackendConfig
 from semslam.geometry.se3 import FloatArray, compose
 
 APART = np.array([4.3, 0.0, 0.0])
@@ -57,14 +56,9 @@ def count(tour: int, noise: float, factor: int) -> tuple[int, int, int, int]:
         alike[last:, :3, 3] -= APART
     false = measure(alike, [(elsewhere + k, last + k) for k in range(15) if lookalike[k]], rng)
     odometry = measure_odometry(poses, rng, 1.0, np.r_[[0.002] * 3, [noise] * 3])
-    graph = PoseGraph()
-    for key, pose in enumerate(compose([edge.T_from_to for edge in odometry], poses[0])):
-        graph.add_keyframe(key, pose)
-    for edge in odometry:
-        stated = Edge(edge.from_key, edge.to_key, edge.T_from_to, edge.covariance / factor**2)
-        graph.add_odometry(stated.from_key, stated.to_key, stated.T_from_to, stated.covariance)
-    for loop in (*true, *false):
-        graph.add_loop(constraint_of(loop))
+    stated = [edge.widened(1.0 / factor) for edge in odometry]
+    start = dict(enumerate(compose([edge.T_from_to for edge in odometry], poses[0])))
+    graph = rebuilt(start, stated, [constraint_of(loop) for loop in (*true, *false)], (), BackendConfig())
     accepted = [verdict.accepted for verdict in graph.optimize().verdicts]
     return sum(accepted[HALL_LOOPS : len(true)]), int(present.sum()), sum(accepted[len(true) :]), int(lookalike.sum())
 

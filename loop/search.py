@@ -134,7 +134,7 @@ class LoopSearch:
         with one_blas_thread():
             candidates = self._detector.query(view)
         known = [*self._keyframes, keyframe]
-        found: dict[int, LoopConstraint] = {}
+        found: set[int] = set()
         outcomes: list[Verification] = []
         for candidate in _views_first(candidates):
             if candidate.match in found:
@@ -142,7 +142,8 @@ class LoopSearch:
                 continue
             outcome = self._verifier.verify(*ends_of(candidate, known), candidate)
             if isinstance(outcome, LoopConstraint):
-                outcome = found[candidate.match] = at_candidate(outcome, known)
+                found.add(candidate.match)
+                outcome = at_candidate(outcome, known)
             outcomes.append(outcome)
         return outcomes
 

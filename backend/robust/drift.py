@@ -34,22 +34,22 @@ class Drift:
         return cls._between(loops, T, covariance, joined)
 
     @classmethod
-    def from_graph(cls, graph: gtsam.NonlinearFactorGraph, values: gtsam.Values, loops: Sequence[Edge]) -> Self:
-        """Against a graph that holds none of these loops.
+    def from_graph(cls, graph: gtsam.NonlinearFactorGraph, values: gtsam.Values, loops: Sequence[Edge]) -> Self | None:
+        """Against a graph that holds none of these loops; None where it leaves a pose open.
 
         Args:
             graph: the factors.
             values: its optimum.
             loops: (L,) edges between keys of it.
-
-        Raises:
-            RuntimeError: GTSAM's own, where the system is indeterminate.
         """
-        marginals = gtsam.Marginals(graph, values)
+        try:
+            marginals = gtsam.Marginals(graph, values)
+            joints = [marginals.jointMarginalCovariance(gtsam.KeyVector([e.from_key, e.to_key])) for e in loops]
+        except RuntimeError:  # GTSAM's own
+            return None
         T, covariance = np.zeros((len(loops), 4, 4)), np.zeros((len(loops), 6, 6))
-        for row, loop in enumerate(loops):
+        for row, (loop, joint) in enumerate(zip(loops, joints, strict=True)):
             a, b = loop.from_key, loop.to_key
-            joint = marginals.jointMarginalCovariance(gtsam.KeyVector([a, b]))
             T[row] = values.atPose3(a).between(values.atPose3(b)).matrix()
             moved = np.hstack([-adjoints(invert(T[row : row + 1]))[0], np.eye(6)])
             both = np.block([[joint.at(a, a), joint.at(a, b)], [joint.at(b, a), joint.at(b, b)]])

@@ -30,8 +30,10 @@ def outvote(chain: OdometryChain, problem: RobustProblem, screening: Screening) 
         screening: which of them stand by odometry.
     """
     standing = np.flatnonzero(screening.eligible)
-    chosen = [problem.loops[i] for i in standing.tolist()]
     distances = screening.distances[standing]
+    if not (distances > TYPICAL).any():
+        return screening
+    chosen = [problem.loops[i] for i in standing.tolist()]
     known, values, votes = gtsam.NonlinearFactorGraph(problem.trusted), problem.initial, 0
     reasons = list(screening.reasons)
     groups = find_hypotheses(chain, chosen, problem.max_residual).members
@@ -53,8 +55,7 @@ def _contradicts(
     graph: gtsam.NonlinearFactorGraph, values: gtsam.Values, loops: Sequence[Edge], max_residual: float
 ) -> bool:
     """Whether the optimum of a graph puts the ends of loops elsewhere than these do."""
-    try:
-        drift = Drift.from_graph(graph, values, loops)
-    except RuntimeError:  # GTSAM's own: a graph that leaves something open contradicts nothing
+    drift = Drift.from_graph(graph, values, loops)
+    if drift is None:
         return False
     return bool(np.median(drift.distances) > max_residual and np.median(is_apart(drift.shifts)))

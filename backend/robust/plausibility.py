@@ -113,8 +113,8 @@ def reconsider(
 ) -> Screening:
     """Judge ambiguous loops once more, by what a graph without them says of their ends.
 
-    The loops of other places hold a graph far closer than odometry alone does, so that it often tells which of two
-    rooms that look alike a view is in.
+    The loops of other places hold a graph far closer than odometry alone does, so that it often decides which of
+    two rooms that look alike a view is in.
 
     Args:
         chain: odometry, its covariance widened where it was too small.
@@ -128,9 +128,8 @@ def reconsider(
     if not len(waiting):
         return screening
     chosen = [loops[i] for i in waiting.tolist()]
-    try:
-        drift = Drift.from_graph(graph, values, chosen)
-    except RuntimeError:  # GTSAM's own: a graph that leaves something open decides nothing
+    drift = Drift.from_graph(graph, values, chosen)
+    if drift is None:
         return screening
     still = _ambiguous(chain, chosen, drift, GRAPH, max_residual)
     reasons = list(screening.reasons)

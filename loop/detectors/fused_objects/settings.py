@@ -8,5 +8,5 @@ class FusedObjectsConfig(Section):
 
     min_probability: float = setting(0.5, "probability of a submap's pose that makes a candidate", ge=0, le=1)
     submap_share: float = setting(
-        0.4, "candidates of submaps beside as many of views as there may be, as a share of these", ge=0, le=1
+        0.4, "submaps that are proposed beside the views, as a share of loops.max_candidates", ge=0, le=1
     )

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from semslam.backend.analysis.judge import constraint_of
+from semslam.backend.analysis.judge import constraint_of, rebuilt
 from semslam.backend.analysis.simulation import measure, measure_odometry, ring
 from semslam.backend.graph.chain import OdometryChain, adjoints, deviations, squared_mahalanobis
 from semslam.backend.pose_graph import Edge, PoseGraph
@@ -112,13 +112,8 @@ def test_loops_of_a_room_that_looks_alike_do_not_widen_odometry():
         for e in loop_edges(truth, rng)[:15]
     ]
     assert odometry_scale(OdometryChain(range(80), edges), false, 10.0) == 1.0
-    graph = PoseGraph()
-    for key, pose in enumerate(compose([edge.T_from_to for edge in edges], truth[0])):
-        graph.add_keyframe(key, pose)
-    for edge in edges:
-        graph.add_odometry(edge.from_key, edge.to_key, edge.T_from_to, edge.covariance)
-    for edge in false:
-        graph.add_loop(constraint_of(edge))
+    start = dict(enumerate(compose([edge.T_from_to for edge in edges], truth[0])))
+    graph = rebuilt(start, edges, [constraint_of(edge) for edge in false], (), BackendConfig())
     assert not any(verdict.accepted for verdict in graph.optimize().verdicts)
 
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from semslam.backend.analysis.judge import constraint_of
+from semslam.backend.analysis.judge import constraint_of, rebuilt
 from semslam.backend.analysis.simulation import SIGMAS, measure, measure_odometry, ring
 from semslam.backend.graph.chain import OdometryChain
-from semslam.backend.pose_graph import Edge, PoseGraph
+from semslam.backend.pose_graph import Edge
 from semslam.backend.robust.calibration import cycle_scale
 from semslam.backend.robust.plausibility import screen_loops
 from semslam.config import BackendConfig
@@ -43,14 +43,8 @@ TRUTH = twin_rooms()
 
 def optimise(loops, rng, config=None, sigmas=SIGMAS, count=65):
     edges = measure_odometry(TRUTH[:count], rng, 1.0, sigmas)
-    graph = PoseGraph(config)
-    for key, pose in enumerate(compose([edge.T_from_to for edge in edges], TRUTH[0])):
-        graph.add_keyframe(key, pose)
-    for edge in edges:
-        graph.add_odometry(edge.from_key, edge.to_key, edge.T_from_to, edge.covariance)
-    for loop in loops:
-        graph.add_loop(constraint_of(loop))
-    return graph.optimize()
+    start = dict(enumerate(compose([edge.T_from_to for edge in edges], TRUTH[0])))
+    return rebuilt(start, edges, [constraint_of(loop) for loop in loops], (), config or BackendConfig()).optimize()
 
 
 def reasons(solution):

@@ -1,5 +1,7 @@
 """Precision and recall: against scikit-learn, ties, refusals, first answers, scores out of a detector."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -105,6 +107,18 @@ def test_scores_are_collected_by_row_and_refusals_are_zero() -> None:
     expected[2, 0], expected[3, 1] = 0.10, 0.11
     assert np.allclose(found["recorder"].scores, expected)
     assert np.allclose(found["recorder"].query_ms, 1.0)
+
+
+class Twice(Recorder):
+    """Names each pair twice, the likelier one first."""
+
+    def query(self, view: KeyframeView) -> list[LoopCandidate]:
+        return [replace(found, score=score) for found in super().query(view) for score in (0.8, 0.2)]
+
+
+def test_a_pair_that_is_named_twice_has_its_higher_score() -> None:
+    found = collect_scores({"twice": Contestant(Twice(), Twice())}, (view(10 + i) for i in range(4)))
+    assert found["twice"].scores[2, 0] == found["twice"].scores[3, 1] == 0.8
 
 
 def loop_truth(count: int = 30) -> LoopTruth:
