@@ -25,6 +25,7 @@ class SegmentationConfig(Section):
 class TrainingConfig(Section):
     """How the segmentation network is trained; the size of its input is the segmenter's."""
 
+    backbone: Literal["mobilenetv2", "xception65"] = Field("mobilenetv2", description="the network's encoder")
     start: Path | None = Field(None, description="weights to start from: ADE20K state dict or own checkpoint")
     decoder_channels: int | None = Field(None, gt=0, description="decoder channels to prune the start to")
     epochs: int = Field(60, gt=0, description="passes over the labelled photos")

@@ -12,6 +12,8 @@ from semslam.loop.segmentation.decoding import input_size, shrink
 from semslam.loop.segmentation.segmenters.onnx import FEATURES, IMAGE, image_rows, load_graph, open_session
 from semslam.types import Float32Array, KeyframeView, UInt8Array
 
+MIDDLE_CHANNELS, HIGH_CHANNELS = 96, 320
+"""Channels of MobileNetV2's two layers, on whose features the detectors were trained."""
 AFTER_ENCODER = "/network/aspp/point/conv/Conv"
 """The node that reads the encoder's last output, which the graph gives no name of its own."""
 
@@ -21,8 +23,8 @@ class Encoding:
     """The encoder's features of an image, at a sixteenth of the network's input size.
 
     Attributes:
-        middle: (h, w, 96) float32, block 13.
-        high: (h, w, 320) float32, block 17, the last.
+        middle: (h, w, MIDDLE_CHANNELS) float32, block 13.
+        high: (h, w, HIGH_CHANNELS) float32, block 17, the last.
     """
 
     middle: Float32Array
@@ -55,6 +57,8 @@ class Backbone:
         part = Extractor(model).extract_model([IMAGE], outputs)
         self._session = open_session(part.SerializeToString(), size, threads, outputs)
         self.size = size
+        if [out.shape[1] for out in self._session.get_outputs()] != [MIDDLE_CHANNELS, HIGH_CHANNELS][: len(outputs)]:
+            raise ModelError("The network's encoder is not the MobileNetV2 on whose features the detector was trained.")
 
     @classmethod
     def from_config(cls, config: Config, deep: bool = True) -> Self:

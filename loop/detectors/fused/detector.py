@@ -12,7 +12,7 @@ from semslam.loop.detector import Arrays
 from semslam.loop.detectors.bag_of_words.detector import make_bag
 from semslam.loop.detectors.bag_of_words.vocabulary import Vocabulary, load_vocabulary
 from semslam.loop.detectors.bag_of_words.word_index import Bag, WordIndex, bag_of_arrays, bag_to_arrays
-from semslam.loop.detectors.common.backbone import Backbone
+from semslam.loop.detectors.common.backbone import MIDDLE_CHANNELS, Backbone
 from semslam.loop.detectors.common.cosine_index import WholeIndex
 from semslam.loop.detectors.common.labels import labels_of
 from semslam.loop.detectors.common.remembering import RememberingDetector
@@ -23,8 +23,6 @@ from semslam.loop.detectors.fused.upright import roll_of, turn_image, turn_label
 from semslam.loop.segmentation.classes import MOVABLE
 from semslam.loop.segmentation.decoding import shrink
 from semslam.types import Float32Array, FloatArray, KeyframeView, LoopCandidate, LoopEvidence
-
-MIDDLE_CHANNELS = 96
 
 
 @dataclass(frozen=True, slots=True, eq=False)

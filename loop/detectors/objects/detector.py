@@ -10,7 +10,7 @@ from semslam.config import Config, LoopConfig
 from semslam.errors import ConfigError
 from semslam.geometry.se3 import invert, transform_points
 from semslam.loop.detector import Arrays
-from semslam.loop.detectors.common.backbone import Backbone
+from semslam.loop.detectors.common.backbone import MIDDLE_CHANNELS, Backbone
 from semslam.loop.detectors.common.growing import GrowingArray
 from semslam.loop.detectors.common.memo import LastView
 from semslam.loop.detectors.common.remembering import RememberingDetector
@@ -29,8 +29,8 @@ from semslam.types import (
     SubmapGuess,
 )
 
-LOOK_CHANNELS, LOOK_DIMENSIONS = 96, 24
-"""The encoder's middle features, and how many random directions of them are kept."""
+LOOK_DIMENSIONS = 24
+"""How many random directions of the encoder's middle features are kept."""
 
 
 class ObjectsDetector(RememberingDetector[Submap]):
@@ -52,7 +52,7 @@ class ObjectsDetector(RememberingDetector[Submap]):
         self._backbone, self._config = backbone, config
         self._recent: deque[LabelledCloud] = deque()
         rng = np.random.default_rng(0)
-        self._directions = np.linalg.qr(rng.normal(size=(LOOK_CHANNELS, LOOK_DIMENSIONS)))[0].astype(np.float32)
+        self._directions = np.linalg.qr(rng.normal(size=(MIDDLE_CHANNELS, LOOK_DIMENSIONS)))[0].astype(np.float32)
         self._cloud = LastView(self._label)
         self._clear()
 
@@ -126,7 +126,7 @@ class ObjectsDetector(RememberingDetector[Submap]):
             step = view.keyframe.T_odom_cam[:3, 3] - last.keyframe.T_odom_cam[:3, 3]
             travelled = last.travelled + float(np.linalg.norm(step))
         middle = self._backbone.middle(view)
-        looks: Float32Array = middle.reshape(-1, LOOK_CHANNELS) @ self._directions
+        looks: Float32Array = middle.reshape(-1, MIDDLE_CHANNELS) @ self._directions
         return label_cloud(view, looks, middle.shape[:2], self._config.max_depth, travelled)
 
     def _window(self, keyframe: Keyframe, travelled: float) -> list[LabelledCloud]:

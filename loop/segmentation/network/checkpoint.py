@@ -8,6 +8,7 @@ from torch import Tensor, nn
 
 from semslam.errors import ModelError
 from semslam.loop.segmentation.network.network import DeepLab, build_mobilenet_deeplab
+from semslam.loop.segmentation.network.xception import build_xception_deeplab
 
 
 def read_tensors(path: Path) -> dict[str, Tensor]:
@@ -28,18 +29,30 @@ def read_tensors(path: Path) -> dict[str, Tensor]:
 
 
 def load_network(path: Path) -> DeepLab:
-    """The MobileNetV2 network of a checkpoint, with the decoder's width and the depth branch that it was trained with.
+    """The network of a checkpoint.
 
     Raises:
         ModelError: the file cannot be read or belongs to another network.
     """
     state = read_tensors(path)
     try:
-        width, depth = state["classifier.weight"].shape[1], "depth.stem.conv.weight" in state
-        network = build_mobilenet_deeplab(decoder_channels=width, depth=depth)
-        network.load_state_dict(state)
+        return network_of(state)
     except (KeyError, IndexError, RuntimeError) as error:
         raise ModelError(f"The weights {path} belong to another network.") from error
+
+
+def network_of(state: dict[str, Tensor]) -> DeepLab:
+    """A network with these weights, and with the encoder, the decoder's width and the depth branch that they are of.
+
+    Raises:
+        KeyError, IndexError, RuntimeError: they are of another network.
+    """
+    width = state["classifier.weight"].shape[1]
+    if any(name.startswith("encoder.entry.") for name in state):
+        network = build_xception_deeplab(decoder_channels=width)
+    else:
+        network = build_mobilenet_deeplab(decoder_channels=width, depth="depth.stem.conv.weight" in state)
+    network.load_state_dict(state)
     return network
 
 

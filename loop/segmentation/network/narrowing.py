@@ -12,7 +12,8 @@ from torch import Tensor, nn
 
 from semslam.errors import ModelError
 from semslam.loop.segmentation.decoding import shrink
-from semslam.loop.segmentation.network.network import DeepLab, build_mobilenet_deeplab, to_input
+from semslam.loop.segmentation.network.checkpoint import network_of
+from semslam.loop.segmentation.network.network import DeepLab, to_input
 from semslam.loop.segmentation.photos import Photo
 
 VIEWS = 16
@@ -40,7 +41,7 @@ def narrow_decoder(network: DeepLab, channels: int, images: Tensor) -> DeepLab:
     """Return a network whose decoder has ``channels`` in both layers; it needs further training to regain its accuracy.
 
     Args:
-        network: the trained network with a MobileNetV2.
+        network: the trained network.
         channels: at most as many as the network's decoder has.
         images: (B, 3, H, W) in -1..1, on which the channels are compared.
 
@@ -64,9 +65,7 @@ def narrow_decoder(network: DeepLab, channels: int, images: Tensor) -> DeepLab:
     _keep(state, ("decoder.1.1.conv", "decoder.1.1.norm"), second.kept)
     state["classifier.weight"] = second.weights[:, :, None, None]
     state["classifier.bias"] = second.offsets
-    narrow = build_mobilenet_deeplab(decoder_channels=channels)
-    narrow.load_state_dict(state)
-    return narrow
+    return network_of(state)
 
 
 def _cells_of(network: DeepLab, layer: nn.Conv2d, images: Tensor) -> tuple[Tensor, Tensor]:

@@ -1,13 +1,13 @@
-"""Aligned Xception-65, the backbone that the paper replaces, for comparing speed.
+"""Aligned Xception-65, the backbone that the paper replaces, for comparison.
 
-Chen et al., ECCV 2018, Figure 4. There are no weights for it.
+Chen et al., ECCV 2018, Figure 4. No weights are shipped; ``training.backbone`` trains them.
 """
 
 import torch.nn.functional as F  # noqa: N812
 from torch import Tensor, nn
 
 from semslam.loop.segmentation.network.encoder import ConvNorm, Encoder, Encoding
-from semslam.loop.segmentation.network.network import DeepLab
+from semslam.loop.segmentation.network.network import DECODER_CHANNELS, DeepLab
 
 MIDDLE_BLOCKS = 16
 
@@ -99,6 +99,6 @@ class Xception65(Encoder):
         return Encoding(F.relu(low), middle, x)
 
 
-def build_xception_deeplab(classes: int = 40) -> DeepLab:
-    """DeepLabv3+ on Xception-65."""
-    return DeepLab(Xception65(), classes)
+def build_xception_deeplab(classes: int = 40, decoder_channels: int = DECODER_CHANNELS) -> DeepLab:
+    """DeepLabv3+ on Xception-65, which sees colour alone."""
+    return DeepLab(Xception65(), classes, decoder_channels=decoder_channels)

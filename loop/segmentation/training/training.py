@@ -12,7 +12,13 @@ import torch
 from semslam.config import Config
 from semslam.errors import ConfigError, ModelError
 from semslam.loop.segmentation.decoding import input_size
-from semslam.loop.segmentation.network.checkpoint import load_network, read_tensors, save_atomically, save_weights
+from semslam.loop.segmentation.network.checkpoint import (
+    load_network,
+    network_of,
+    read_tensors,
+    save_atomically,
+    save_weights,
+)
 from semslam.loop.segmentation.network.export import write_calibrated
 from semslam.loop.segmentation.network.narrowing import narrow_decoder, plain_views
 from semslam.loop.segmentation.network.network import (
@@ -22,6 +28,7 @@ from semslam.loop.segmentation.network.network import (
     build_mobilenet_deeplab,
 )
 from semslam.loop.segmentation.network.pretrained import convert_ade20k, refresh_norms
+from semslam.loop.segmentation.network.xception import Xception65, build_xception_deeplab
 from semslam.loop.segmentation.training.depth_head import DepthHead
 from semslam.loop.segmentation.training.examples import ExampleSource
 from semslam.loop.segmentation.training.optimisation import (
@@ -109,14 +116,20 @@ class _Run:
     def _beginning(self) -> DeepLab:
         """The network before the first step."""
         path, channels = self.settings.start, self.settings.decoder_channels
+        xception = self.settings.backbone == "xception65"
+        if xception and self.settings.depth:
+            raise ConfigError("Only a network with training.backbone=mobilenetv2 can see depth.")
         if path is None:
-            return build_mobilenet_deeplab(decoder_channels=channels or DECODER_CHANNELS)
-        if "cls.weight" in read_tensors(path):
+            build = build_xception_deeplab if xception else build_mobilenet_deeplab
+            network = build(decoder_channels=channels or DECODER_CHANNELS)
+        elif "cls.weight" in read_tensors(path):
             network = build_mobilenet_deeplab()
             convert_ade20k(network, path)
             refresh_norms(network, self.source.batch(np.random.default_rng((self.seed, 0)), NORM_IMAGES)[0][0])
         else:
             network = load_network(path)
+        if isinstance(network.encoder, Xception65) != xception:
+            raise ConfigError(f"The network of {path} has another encoder than training.backbone.")
         if channels is not None:
             # Whole photos, whatever the seed: trainings from one start keep the same channels and have a mean.
             network = narrow_decoder(network, channels, plain_views(self.source.photos, self.size))
@@ -181,10 +194,7 @@ class _Run:
         self.saved_at = time.monotonic()
 
     def _averaged(self) -> DeepLab:
-        sees_depth = self.network.depth is not None
-        network = build_mobilenet_deeplab(decoder_channels=self.network.decoder_channels, depth=sees_depth)
-        network.load_state_dict(self.average)
-        return network
+        return network_of(self.average)
 
     def finish(self) -> Path:
         """Save all, and write the int8 graph and the learning curve."""

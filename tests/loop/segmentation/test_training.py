@@ -7,9 +7,10 @@ import torch
 
 from semslam.config import load_config
 from semslam.errors import ConfigError, DatasetError, ModelError
+from semslam.loop.detectors.common.backbone import Backbone
 from semslam.loop.segmentation.build import build_segmenter
 from semslam.loop.segmentation.network.averaging import average
-from semslam.loop.segmentation.network.checkpoint import read_tensors, save_weights
+from semslam.loop.segmentation.network.checkpoint import load_network, read_tensors, save_weights
 from semslam.loop.segmentation.network.network import build_mobilenet_deeplab
 from semslam.loop.segmentation.photos import Photo, read_photo
 from semslam.loop.segmentation.segmenters.onnx import load_graph
@@ -107,6 +108,25 @@ def test_resumed_training_with_depth_ends_with_the_same_weights(deep_rooms, tmp_
 def test_training_with_depth_needs_depth(rooms, tmp_path):
     with pytest.raises(DatasetError, match="no depth"):
         train(rooms, settings(depth=True), tmp_path / "run")
+
+
+def test_a_network_on_xception_is_trained_and_serves(deep_rooms, tmp_path):
+    with pytest.raises(KilledError):  # before its export to int8, which takes half a minute
+        train(deep_rooms, settings(backbone="xception65"), tmp_path, kill_at_third)
+    weights = tmp_path / "weights.pt"
+    config = load_config(overrides={"segmentation": {**SIZE, "weights": str(weights)}})
+    assert build_segmenter(config).segment(read_photo(deep_rooms, "4").color).labels.shape == (96, 128)
+    with pytest.raises(ModelError, match="not the MobileNetV2"):
+        Backbone.from_config(config)
+    with pytest.raises(ConfigError, match="another encoder"):
+        train(deep_rooms, settings(start=str(weights)), tmp_path / "next")
+    with pytest.raises(ConfigError, match="can see depth"):
+        train(deep_rooms, settings(backbone="xception65", depth=True), tmp_path / "next")
+
+
+def test_a_network_that_begins_at_random_sees_depth_where_asked(deep_rooms, tmp_path):
+    weights = train(deep_rooms, settings(epochs=1, depth=True), tmp_path)
+    assert load_network(weights).depth is not None
 
 
 def test_damaged_state_is_one_sentence(rooms, tmp_path):
