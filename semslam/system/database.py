@@ -18,7 +18,7 @@ from semslam.loop.detector import Look
 from semslam.loop.memory import LoopMemory
 from semslam.types import Cloud, Features, Intrinsics, Keyframe
 
-KIND, VERSION = "semslam loop database", 1
+KIND, VERSION = "semslam loop database", 2
 WHAT = "The loop database"
 FEATURES, CLOUD = tuple(f.name for f in fields(Features)), tuple(f.name for f in fields(Cloud))
 LOOK = "look."
@@ -33,21 +33,25 @@ class MemorySource:
     Attributes:
         detector: its name.
         settings: its own, and those of what it sees, as JSON.
+        weights: digest of what was learned.
     """
 
     detector: str
     settings: str
+    weights: str
 
     def check(self, wanted: "MemorySource", path: str | Path) -> None:
         """Make sure that the memory in a file is of use.
 
         Raises:
-            ConfigError: it was made with another detector or other settings.
+            ConfigError: it was made with another detector, other settings or other weights.
         """
         if self.detector != wanted.detector:
             raise ConfigError(f"{path} was made with the detector '{self.detector}', not '{wanted.detector}'.")
         if self.settings != wanted.settings:
             raise ConfigError(f"{path} was made with other settings of '{self.detector}', keypoints or segmentation.")
+        if self.weights != wanted.weights:
+            raise ConfigError(f"{path} was made with other learned weights; its keyframes would be compared wrongly.")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -77,6 +81,7 @@ def write_database(path: Path, database: LoopDatabase) -> None:
         "version": VERSION,
         "detector": database.source.detector,
         "settings": database.source.settings,
+        "weights": database.source.weights,
         "keys": list(database.keys),
         "cameras": [asdict(keyframe.intrinsics) for keyframe in keyframes],
     }
@@ -157,13 +162,13 @@ def _read(header: Mapping[str, Any], arrays: Mapping[str, AnyArray]) -> LoopData
         )
         for number in range(count)
     )
-    source = MemorySource(str(header["detector"]), str(header["settings"]))
+    source = MemorySource(str(header["detector"]), str(header["settings"]), str(header["weights"]))
     return LoopDatabase(source, keys, LoopMemory(keyframes, _looks(arrays, count), _closed(arrays, count)))
 
 
 def _closed(arrays: Mapping[str, AnyArray], count: int) -> tuple[tuple[int, int], ...]:
-    """Query and match of each loop; files of before 2026-11-29 have none."""
-    pairs = arrays.get("closed", np.zeros((0, 2), dtype=np.int64))
+    """Query and match of each loop."""
+    pairs = arrays["closed"]
     if pairs.ndim != 2 or pairs.shape[1] != 2 or not ((pairs >= 0) & (pairs < count)).all():
         raise ValueError("loops of no keyframe")
     return tuple((int(query), int(match)) for query, match in pairs)

@@ -3,6 +3,7 @@
 import json
 from collections.abc import Collection
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
@@ -12,6 +13,7 @@ from semslam.config import Config
 from semslam.errors import ConfigError, DatasetError
 from semslam.frontend.keyframes import KeyframeBuilder
 from semslam.loop.detector import LoopDetector
+from semslam.loop.detectors.common.weight_file import WEIGHT_SUFFIXES, digest_of_weights
 from semslam.loop.memory import LoopMemory
 from semslam.loop.search import LoopSearch
 from semslam.loop.verification.verifier import LoopVerifier
@@ -100,9 +102,12 @@ def memory_source(own: LoopDetector | None, config: Config) -> MemorySource:
     if not all(hasattr(kind, method) for method in ("forget", "looks", "recall")):
         raise ConfigError(f"The detector '{name}' cannot forget keyframes, nor save or load them.")
     nested = config.nested()
-    sections = (plugins.section_name(name), "keypoints", "segmentation")
+    names = (name, *getattr(kind, "parts", ()))
+    sections = (*map(plugins.section_name, names), "keypoints", "segmentation")
     settings = {section: nested[section] for section in sections if section in nested}
-    return MemorySource(name, json.dumps(settings, sort_keys=True))
+    named = [Path(str(value)) for section in settings.values() for value in section.values() if value]
+    files = [path for path in named if path.suffix in WEIGHT_SUFFIXES and path.is_file()]
+    return MemorySource(name, json.dumps(settings, sort_keys=True), digest_of_weights(files))
 
 
 def _verified(outcomes: Collection[Verification]) -> tuple[LoopConstraint, ...]:

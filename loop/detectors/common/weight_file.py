@@ -1,6 +1,7 @@
-"""Reading the arrays that detectors ship, with a clear error where they do not fit."""
+"""The weights that detectors ship: reading them with a clear error where they do not fit, and telling them apart."""
 
-from collections.abc import Iterator, Mapping
+import hashlib
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -9,6 +10,11 @@ import numpy.typing as npt
 
 from semslam.errors import ModelError
 from semslam.files import read_arrays
+from semslam.loop.segmentation.shipped import CHECKPOINT, INT8_GRAPH
+
+FOLDER = Path(__file__).parents[2] / "weights"
+"""Where everything lies that the detectors ship."""
+WEIGHT_SUFFIXES = (".npz", ".onnx", ".pt", ".pth")
 
 
 @contextmanager
@@ -29,6 +35,14 @@ def open_weights(path: Path, content: str) -> Iterator[Mapping[str, npt.NDArray[
         yield arrays
     except (ValueError, KeyError, AttributeError) as error:
         raise ModelError(f"{path} is no {content}, or it is damaged.") from error
+
+
+def digest_of_weights(others: Sequence[Path]) -> str:
+    """SHA-256 of all that detectors and segmentation have learned: what ships, and other files."""
+    digest = hashlib.sha256()
+    for path in (*sorted(FOLDER.glob("*.npz")), CHECKPOINT, INT8_GRAPH, *others):
+        digest.update(hashlib.sha256(path.read_bytes()).digest())
+    return digest.hexdigest()
 
 
 def load_min_score(path: Path, content: str) -> float:

@@ -28,6 +28,8 @@ class FusedObjectsDetector:
 
     name = "fused-objects"
     needs_labels = True
+    parts = ("fused", "objects")
+    """Detectors whose settings hold as well."""
     Settings = FusedObjectsConfig
 
     def __init__(

@@ -10,10 +10,13 @@ import pytest
 from gtsam.symbol_shorthand import X
 
 from semslam import LoopCloser
-from semslam.config import Config
+from semslam.config import Config, load_config
 from semslam.errors import ConfigError, GraphError, ResultsError
 from semslam.geometry.se3 import invert
+from semslam.loop.segmentation.shipped import INT8_GRAPH
+from semslam.system import finder
 from semslam.system.database import read_database
+from semslam.system.finder import memory_source
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
 LOOSE = {"min_gap": 1.0, "min_score": 0.0, "follow": 1}
@@ -149,7 +152,7 @@ def test_equal_closers_are_equal_bytes_and_an_empty_one_can_be_saved(room, frame
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a", "b", "empty"]
 
 
-def test_another_detector_or_other_settings_are_refused(room, frames, tmp_path):
+def test_another_detector_or_other_settings_are_refused(room, frames, tmp_path, monkeypatch):
     path = tmp_path / "rooms.npz"
     closer = make(room)
     add(closer, frames[:2])
@@ -158,6 +161,23 @@ def test_another_detector_or_other_settings_are_refused(room, frames, tmp_path):
         make(room, "thumbnail").load(path)
     with pytest.raises(ConfigError, match="other settings of 'dbow'"):
         make(room, dbow={"group": 0.1}).load(path)
+    monkeypatch.setattr(finder, "digest_of_weights", lambda _others: "learned anew")
+    with pytest.raises(ConfigError, match="other learned weights"):
+        make(room).load(path)
+
+
+def test_memory_depends_on_the_settings_and_weights_of_all_its_parts(tmp_path):
+    weights = tmp_path / "own.onnx"
+    weights.write_bytes(INT8_GRAPH.read_bytes())
+    own = {"segmentation": {"weights": str(weights)}}
+    sources = [
+        memory_source(None, load_config(overrides=changes))
+        for changes in ({}, {"objects": {"voxel": 0.2}}, {"fused": {"word_share": 0.2}}, own)
+    ]
+    weights.write_bytes(b"another network")
+    sources.append(memory_source(None, load_config(overrides=own)))
+    assert len(set(sources)) == len(sources)
+    assert sources[-1].settings == sources[-2].settings
 
 
 def test_a_damaged_file_is_one_sentence_whatever_byte_is_wrong(room, frames, tmp_path):
