@@ -135,7 +135,8 @@ def rare_cosine(descriptors: Float32Array) -> float:
 
 def fusion_from(folder: Path) -> None:
     config = Config()
-    backbone, segmenter = Backbone.from_config(config), OnnxSegmenter.from_config(config)
+    backbone = Backbone.from_config(config, size=fusion.ENCODED_SIZE)
+    segmenter = OnnxSegmenter.from_config(config)
     extractor, tree = FeatureExtractor(config.keypoints), vocabulary.load_vocabulary()
     movable = frozenset(i for i, name in enumerate(NYU40_NAMES) if name in MOVABLE)
     photo_of, pooled, classes, same = [], [], [], []

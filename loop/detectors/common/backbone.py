@@ -61,15 +61,16 @@ class Backbone:
             raise ModelError("The network's encoder is not the MobileNetV2 on whose features the detector was trained.")
 
     @classmethod
-    def from_config(cls, config: Config, deep: bool = True) -> Self:
-        """Load the network that the segmenter "onnx" would load.
+    def from_config(cls, config: Config, deep: bool = True, size: tuple[int, int] | None = None) -> Self:
+        """Load the network that the segmenter "onnx" would load; ``size`` is the segmentation's where none is given.
 
         Raises:
             ModelError: the weights are missing, damaged or of another network.
             ConfigError: the input size does not fit the network.
         """
         settings = config.segmentation
-        return cls(load_graph(settings.weights, settings.precision), input_size(settings), settings.threads, deep)
+        graph = load_graph(settings.weights, settings.precision)
+        return cls(graph, size or input_size(settings), settings.threads, deep)
 
     def encode(self, color: UInt8Array) -> Encoding:
         """Encode an RGB image (H, W, 3) uint8; needs ``deep``."""

@@ -17,7 +17,7 @@ from semslam.loop.detectors.common.cosine_index import WholeIndex
 from semslam.loop.detectors.common.labels import labels_of
 from semslam.loop.detectors.common.remembering import RememberingDetector
 from semslam.loop.detectors.fused.class_index import ClassIndex
-from semslam.loop.detectors.fused.fusion import ClassFeatures, FusionModel, load_fusion, pool_classes
+from semslam.loop.detectors.fused.fusion import ENCODED_SIZE, ClassFeatures, FusionModel, load_fusion, pool_classes
 from semslam.loop.detectors.fused.settings import FusedConfig
 from semslam.loop.detectors.fused.upright import roll_of, turn_image, turn_labels
 from semslam.loop.segmentation.classes import MOVABLE
@@ -69,7 +69,7 @@ class FusedDetector(RememberingDetector[_Look]):
         Raises:
             ModelError: weights are missing or damaged.
         """
-        backbone = Backbone.from_config(config)
+        backbone = Backbone.from_config(config, size=ENCODED_SIZE)
         own = config.section(cls.name, cls.Settings)
         return cls(backbone, load_vocabulary(), load_fusion(), own, config.loops)
 

@@ -13,6 +13,12 @@ from semslam.loop.segmentation.classes import NYU40_NAMES
 from semslam.types import Float32Array, FloatArray, UInt8Array
 
 SHIPPED = Path(__file__).parents[2] / "weights" / "fusion.npz"
+ENCODED_SIZE = (192, 144)
+"""Width and height at which images are encoded; the model was learned at this size."""
+SAMPLES = 8
+"""Labels along each side of a cell of features that are looked at."""
+MIN_CELLS = 0.5
+"""Cells that a class must cover in sum to have features."""
 MOVABLE_WEIGHT = 0.5
 """Weight of a movable class relative to structure, which does not move."""
 _KNOWN = {name: index for index, name in enumerate(NYU40_NAMES)}
@@ -103,13 +109,25 @@ class ClassFeatures:
 
 
 def pool_classes(middle: Float32Array, labels: UInt8Array, movable: frozenset[int]) -> ClassFeatures:
-    """Average features (h, w, C) over the classes of a label image (H, W); void is left out."""
-    height, width = middle.shape[:2]
-    small = cv2.resize(labels, (width, height), interpolation=cv2.INTER_NEAREST).ravel()
-    present = np.unique(small[small > 0])
-    member = (small[None, :] == present[:, None]).astype(np.float32)
+    """Average features (h, w, C) over the classes of a label image (H, W), by the share of each cell that they cover.
+
+    Void and classes that cover less than ``MIN_CELLS`` are left out.
+    """
+    covered = _cover(labels, *middle.shape[:2])
+    present = 1 + np.flatnonzero(covered[:, 1:].sum(axis=0) >= MIN_CELLS)
+    member = covered[:, present].T
     counts = member.sum(axis=1)
-    vectors = member @ middle.reshape(len(small), -1) / np.maximum(counts, 1)[:, None]
+    vectors = member @ middle.reshape(len(covered), -1) / counts[:, None]
     vectors /= np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-9)
     weights = np.array([MOVABLE_WEIGHT if int(label) in movable else 1.0 for label in present])
-    return ClassFeatures(present.astype(np.uint8), vectors.astype(np.float32), np.sqrt(counts / len(small)) * weights)
+    shares = np.sqrt(counts / len(covered)) * weights
+    return ClassFeatures(present.astype(np.uint8), vectors.astype(np.float32), shares)
+
+
+def _cover(labels: UInt8Array, height: int, width: int) -> Float32Array:
+    """Share (height * width, 256) of each cell that each label of an image (H, W) covers."""
+    side = SAMPLES
+    fine = cv2.resize(labels, (side * width, side * height), interpolation=cv2.INTER_NEAREST)
+    cells = np.arange(height * width).reshape(height, width).repeat(side, axis=0).repeat(side, axis=1)
+    counts = np.bincount((256 * cells + fine).ravel(), minlength=256 * height * width)
+    return (counts.reshape(-1, 256) / side**2).astype(np.float32)

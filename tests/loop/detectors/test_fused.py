@@ -41,6 +41,17 @@ def test_classes_are_averaged_without_void_and_movable_ones_weigh_less() -> None
     assert len(pool_classes(middle, np.zeros((8, 8), np.uint8), frozenset()).labels) == 0
 
 
+def test_classes_count_by_the_share_of_cells_that_they_cover() -> None:
+    labels = np.ones((16, 16), np.uint8)
+    labels[:, :4], labels[0, 15] = 2, 3  # half of the left cells, and too little of another
+    middle = RNG.normal(size=(2, 2, 5)).astype(np.float32)
+    features = pool_classes(middle, labels, frozenset())
+    assert features.labels.tolist() == [1, 2]
+    mean = middle[:, 0].mean(axis=0)
+    np.testing.assert_allclose(features.vectors[1], mean / np.linalg.norm(mean), atol=1e-5)
+    np.testing.assert_allclose(features.shares[1] ** 2, 0.25)
+
+
 def test_class_scores_are_one_for_the_same_picture_and_zero_without_common_classes() -> None:
     vectors = np.eye(3, dtype=np.float32)
     one = ClassFeatures(np.array([1, 2], np.uint8), vectors[:2], np.array([0.7, 0.5]))
