@@ -22,7 +22,7 @@ from semslam.loop.verification.verifier import LoopVerifier
 from semslam.runtime.workers import WorkerKind, answer_of, make_worker, worker_kind
 from semslam.system.database import LoopDatabase, read_database, write_database
 from semslam.system.factors import Closure, LoopFactors, Noise, PlaceMatch
-from semslam.system.finder import LoopFinder, checked_frame, memory_source
+from semslam.system.finder import LoopFinder, check_remembers, checked_frame, memory_source
 from semslam.types import Intrinsics, LabelMap, LoopConstraint, Transform
 
 POSED = -1
@@ -169,7 +169,7 @@ class LoopCloser:
             GraphError: a key was never added, or was forgotten before.
             ConfigError: the detector is one of your own that cannot forget.
         """
-        memory_source(self._detector, self._config)
+        check_remembers(self._detector, self._config)
         numbers = {key: number for number, key in enumerate(self._keys) if number not in self._forgotten}
         ids = []
         for key in dict.fromkeys(keys):

@@ -97,10 +97,8 @@ def memory_source(own: LoopDetector | None, config: Config) -> MemorySource:
     Raises:
         ConfigError: it is one from outside that cannot forget keyframes or hand its memory out.
     """
-    kind = own or plugins.load("semslam.detectors", config.detector)
-    name = config.detector if own is None else str(getattr(own, "name", type(own).__name__))
-    if not all(hasattr(kind, method) for method in ("forget", "looks", "recall")):
-        raise ConfigError(f"The detector '{name}' cannot forget keyframes, nor save or load them.")
+    check_remembers(own, config)
+    kind, name = _kind(own, config), _name(own, config)
     nested = config.nested()
     names = (name, *getattr(kind, "parts", ()))
     sections = (*map(plugins.section_name, names), "keypoints", "segmentation")
@@ -108,6 +106,24 @@ def memory_source(own: LoopDetector | None, config: Config) -> MemorySource:
     named = [Path(str(value)) for section in settings.values() for value in section.values() if value]
     files = [path for path in named if path.suffix in WEIGHT_SUFFIXES and path.is_file()]
     return MemorySource(name, json.dumps(settings, sort_keys=True), digest_of_weights(files))
+
+
+def check_remembers(own: LoopDetector | None, config: Config) -> None:
+    """Make sure that a detector can forget keyframes and hand its memory out.
+
+    Raises:
+        ConfigError: it is one from outside that cannot.
+    """
+    if not all(hasattr(_kind(own, config), method) for method in ("forget", "looks", "recall")):
+        raise ConfigError(f"The detector '{_name(own, config)}' cannot forget keyframes, nor save or load them.")
+
+
+def _kind(own: LoopDetector | None, config: Config) -> object:
+    return own or plugins.load("semslam.detectors", config.detector)
+
+
+def _name(own: LoopDetector | None, config: Config) -> str:
+    return config.detector if own is None else str(getattr(own, "name", type(own).__name__))
 
 
 def _verified(outcomes: Collection[Verification]) -> tuple[LoopConstraint, ...]:

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from semslam.loop.detectors.common.weight_file import open_weights
+from semslam.loop.detectors.common.weight_file import SHIPPED_FOLDER, open_weights
 from semslam.types import Float32Array, IntArray, UInt8Array
 
-SHIPPED = Path(__file__).parents[2] / "weights" / "vocabulary.npz"
+SHIPPED = SHIPPED_FOLDER / "vocabulary.npz"
 
 Descriptors = UInt8Array | Float32Array
 """(N, D): uint8 rows of bits, compared by Hamming distance, or float32 rows, compared by Euclidean distance."""

@@ -12,7 +12,7 @@ from semslam.errors import ModelError
 from semslam.files import read_arrays
 from semslam.loop.segmentation.shipped import CHECKPOINT, INT8_GRAPH
 
-FOLDER = Path(__file__).parents[2] / "weights"
+SHIPPED_FOLDER = Path(__file__).parents[2] / "weights"
 """Where everything lies that the detectors ship."""
 WEIGHT_SUFFIXES = (".npz", ".onnx", ".pt", ".pth")
 
@@ -40,7 +40,7 @@ def open_weights(path: Path, content: str) -> Iterator[Mapping[str, npt.NDArray[
 def digest_of_weights(others: Sequence[Path]) -> str:
     """SHA-256 of all that detectors and segmentation have learned: what ships, and other files."""
     digest = hashlib.sha256()
-    for path in (*sorted(FOLDER.glob("*.npz")), CHECKPOINT, INT8_GRAPH, *others):
+    for path in (*sorted(SHIPPED_FOLDER.glob("*.npz")), CHECKPOINT, INT8_GRAPH, *others):
         digest.update(hashlib.sha256(path.read_bytes()).digest())
     return digest.hexdigest()
 

@@ -8,11 +8,11 @@ import cv2
 import numpy as np
 
 from semslam.loop.detectors.common.backbone import Encoding
-from semslam.loop.detectors.common.weight_file import open_weights
+from semslam.loop.detectors.common.weight_file import SHIPPED_FOLDER, open_weights
 from semslam.loop.segmentation.classes import NYU40_NAMES
 from semslam.types import Float32Array, FloatArray, UInt8Array
 
-SHIPPED = Path(__file__).parents[2] / "weights" / "fusion.npz"
+SHIPPED = SHIPPED_FOLDER / "fusion.npz"
 ENCODED_SIZE = (192, 144)
 """Width and height at which images are encoded; the model was learned at this size."""
 SAMPLES = 8

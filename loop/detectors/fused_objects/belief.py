@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from semslam.loop.detectors.common.weight_file import open_weights
+from semslam.loop.detectors.common.weight_file import SHIPPED_FOLDER, open_weights
 from semslam.types import FloatArray, LoopCandidate
 
-SHIPPED = Path(__file__).parents[2] / "weights" / "submaps.npz"
+SHIPPED = SHIPPED_FOLDER / "submaps.npz"
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -9,11 +9,11 @@ import numpy as np
 from semslam.config import Config, LoopConfig
 from semslam.errors import ConfigError
 from semslam.loop.detectors.common.backbone import Backbone
-from semslam.loop.detectors.common.weight_file import open_weights
+from semslam.loop.detectors.common.weight_file import SHIPPED_FOLDER, open_weights
 from semslam.loop.detectors.global_descriptor.descriptor import DescriptorDetector
 from semslam.types import Float32Array, KeyframeView
 
-SHIPPED = Path(__file__).parents[2] / "weights" / "channel_words.npz"
+SHIPPED = SHIPPED_FOLDER / "channel_words.npz"
 SHARPNESS = 20.0
 """How fast a word's share of a channel falls with its cosine; the nearest word alone would jump from image to image."""
 

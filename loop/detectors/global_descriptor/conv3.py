@@ -1,18 +1,17 @@
 """Flattened convolutional features (Sünderhauf et al., IROS 2015)."""
 
-from pathlib import Path
 from typing import Protocol, Self
 
 import numpy as np
 
 from semslam.config import Config, LoopConfig
 from semslam.loop.detectors.common.backbone import Backbone
-from semslam.loop.detectors.common.weight_file import load_min_score
+from semslam.loop.detectors.common.weight_file import SHIPPED_FOLDER, load_min_score
 from semslam.loop.detectors.global_descriptor.descriptor import DescriptorDetector
 from semslam.loop.detectors.global_descriptor.settings import Conv3Config
 from semslam.types import Float32Array, KeyframeView, UInt8Array
 
-SHIPPED = Path(__file__).parents[2] / "weights" / "encoder_map.npz"
+SHIPPED = SHIPPED_FOLDER / "encoder_map.npz"
 """What was learned of the shipped encoder: the score that makes a candidate."""
 
 

@@ -1,18 +1,17 @@
 """Loop detection by PCANet's features (Xia et al., IJCNN 2016)."""
 
-from pathlib import Path
 from typing import Self
 
 import numpy as np
 
 from semslam.config import Config, LoopConfig
-from semslam.loop.detectors.common.weight_file import load_min_score
+from semslam.loop.detectors.common.weight_file import SHIPPED_FOLDER, load_min_score
 from semslam.loop.detectors.global_descriptor.descriptor import DescriptorDetector
 from semslam.loop.detectors.pcanet.network import PcaNet, gray_of, load_pcanet
 from semslam.loop.detectors.pcanet.settings import PcaNetConfig
 from semslam.types import Float32Array, KeyframeView
 
-SHIPPED = Path(__file__).parents[2] / "weights" / "pcanet.npz"
+SHIPPED = SHIPPED_FOLDER / "pcanet.npz"
 
 
 class PcaNetDetector(DescriptorDetector):

@@ -1,17 +1,17 @@
 """Loop detection by the layers of a place network (Hou et al., ICIA 2015)."""
 
-from pathlib import Path
 from typing import Self
 
 from semslam.config import Config, LoopConfig
 from semslam.errors import ConfigError
 from semslam.loop.detectors.common.backbone import Backbone
+from semslam.loop.detectors.common.weight_file import SHIPPED_FOLDER
 from semslam.loop.detectors.global_descriptor.descriptor import DescriptorDetector
 from semslam.loop.detectors.placecnn.network import EncoderPlaces, PlaceNetwork
 from semslam.loop.detectors.placecnn.settings import PlaceCnnConfig
 from semslam.types import Float32Array, KeyframeView
 
-SHIPPED = Path(__file__).parents[2] / "weights" / "placecnn.npz"
+SHIPPED = SHIPPED_FOLDER / "placecnn.npz"
 
 
 class PlaceCnnDetector(DescriptorDetector):

@@ -1,6 +1,5 @@
 """Stacked denoising autoencoder on patches (Gao and Zhang, Autonomous Robots 2017)."""
 
-from pathlib import Path
 from typing import Self
 
 import cv2
@@ -10,10 +9,11 @@ from semslam.config import Config, LoopConfig
 from semslam.loop.detector import Arrays
 from semslam.loop.detectors.common.growing import GrowingArray
 from semslam.loop.detectors.common.remembering import RememberingDetector
+from semslam.loop.detectors.common.weight_file import SHIPPED_FOLDER
 from semslam.loop.detectors.sda.autoencoder import Autoencoder, load_autoencoder
 from semslam.types import Float32Array, FloatArray, KeyframeView, LoopCandidate, LoopEvidence, UInt8Array
 
-SHIPPED = Path(__file__).parents[2] / "weights" / "autoencoder.npz"
+SHIPPED = SHIPPED_FOLDER / "autoencoder.npz"
 WIDTH, HEIGHT = 320, 240
 COLUMNS, ROWS = 8, 6
 PATCH = 41

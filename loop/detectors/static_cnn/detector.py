@@ -1,6 +1,5 @@
 """Convolutional features of the static part of an image, after Li et al. 2021 (Li et al. 2022, section 2)."""
 
-from pathlib import Path
 from typing import Self
 
 import cv2
@@ -10,12 +9,12 @@ import numpy.typing as npt
 from semslam.config import Config, LoopConfig
 from semslam.loop.detectors.common.backbone import Backbone
 from semslam.loop.detectors.common.labels import labels_of
-from semslam.loop.detectors.common.weight_file import load_min_score
+from semslam.loop.detectors.common.weight_file import SHIPPED_FOLDER, load_min_score
 from semslam.loop.detectors.global_descriptor.descriptor import DescriptorDetector
 from semslam.loop.detectors.static_cnn.settings import RemovalReading, StaticCnnConfig
 from semslam.types import Float32Array, KeyframeView, LabelMap, UInt8Array
 
-SHIPPED = Path(__file__).parents[2] / "weights" / "static_cnn.npz"
+SHIPPED = SHIPPED_FOLDER / "static_cnn.npz"
 MIN_STATIC = 0.05
 """Share of a cell that must be static for the cell to count."""
 

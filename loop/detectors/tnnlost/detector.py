@@ -1,6 +1,5 @@
 """TNNLoST, after Wu et al. (Li et al. 2022, section 2): semantically calibrated features, aggregated by TNNVLAD."""
 
-from pathlib import Path
 from typing import Self
 
 import cv2
@@ -10,13 +9,13 @@ from semslam.config import Config, LoopConfig
 from semslam.loop.detectors.common.backbone import Backbone
 from semslam.loop.detectors.common.labels import labels_of
 from semslam.loop.detectors.common.vlad import Codebook, aggregate, load_codebook, unit_rows
-from semslam.loop.detectors.common.weight_file import load_min_score
+from semslam.loop.detectors.common.weight_file import SHIPPED_FOLDER, load_min_score
 from semslam.loop.detectors.global_descriptor.descriptor import DescriptorDetector
 from semslam.loop.detectors.objects.labelled import GROUP_COUNT, group_of_names
 from semslam.loop.detectors.tnnlost.settings import CalibrationReading, TnnLostConfig
 from semslam.types import Float32Array, KeyframeView, LabelMap
 
-SHIPPED = Path(__file__).parents[2] / "weights" / "tnnlost.npz"
+SHIPPED = SHIPPED_FOLDER / "tnnlost.npz"
 
 
 class TnnLostDetector(DescriptorDetector):
